@@ -244,13 +244,11 @@ def fan(faces: int) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-@pytest.mark.parametrize("faces", [200, 4000])
-def test_normals_at_the_tip_of_a_cone_do_not_depend_on_how_they_are_summed(faces):
-    """The mean over the faces within the crease of each: the same cone in 200 (all pairs) and more (by direction)."""
-    few, many = crease_normals(*fan(200))[:, 0], crease_normals(*fan(faces))[:, 0]
-    assert np.abs(many[0] - few[0]).max() < 0.03 and np.abs(many[faces // 4] - few[50]).max() < 0.03
-    flat = np.array([1.0, 1.0, 0.0]) * fan(faces)[0]
-    assert np.allclose(crease_normals(flat, fan(faces)[1]), [0.0, 0.0, 1.0])
+def test_normals_at_the_tip_of_a_cone_do_not_depend_on_how_finely_it_is_cut():
+    few, many = crease_normals(*fan(200))[:, 0], crease_normals(*fan(4000))[:, 0]
+    assert np.abs(many[0] - few[0]).max() < 0.03 and np.abs(many[1000] - few[50]).max() < 0.03
+    vertices, faces = fan(4000)
+    assert np.allclose(crease_normals(vertices * [1.0, 1.0, 0.0], faces), [0.0, 0.0, 1.0])
 
 
 def test_a_catalogue_can_be_sent_to_other_processes(tmp_path):

@@ -8,7 +8,6 @@ what a file requires must be read here all the same, to refuse it by name.
 from __future__ import annotations
 
 import base64
-import binascii
 import io
 import json
 import struct
@@ -19,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 from embodied.assets.importing.importer import MAX_PIXELS, MAX_TEXTURE, RawPart, Tell
 from embodied.assets.importing.meshing import face_normals
@@ -172,7 +172,8 @@ class _Reader:
 
     def _opened(self, image: dict[str, Any]) -> Image.Image:
         try:
-            with Image.open(io.BytesIO(self._picture_bytes(image)), formats=PICTURES) as opened:
+            data = self._view(image["bufferView"]).tobytes() if "bufferView" in image else _inline(image.get("uri", ""))
+            with Image.open(io.BytesIO(data), formats=PICTURES) as opened:
                 if opened.width * opened.height > MAX_PIXELS:
                     size = f"{opened.width} x {opened.height}"
                     raise RefusedError(f"a picture has {size} pixels, at most {MAX_PIXELS} are read; make it smaller")
@@ -183,9 +184,6 @@ class _Reader:
                 f"its pictures should be whole {' or '.join(PICTURES)} files stored in it, picture {name} is none; "
                 "save that texture again as PNG and export the model with it"
             ) from e
-
-    def _picture_bytes(self, image: dict[str, Any]) -> bytes:
-        return self._view(image["bufferView"]).tobytes() if "bufferView" in image else _inline(image.get("uri", ""))
 
     def _view(self, number: int) -> memoryview:
         """The bytes of a buffer view."""
@@ -531,25 +529,15 @@ def _inline(uri: str) -> bytes:
     _, comma, text = str(uri).partition("base64,")
     if not (comma and str(uri).startswith("data:")):
         raise RefusedError(f"it names the file {shown(uri)}; export it as one .glb that holds its buffers and pictures")
-    try:
-        return base64.b64decode(text, validate=True)
-    except binascii.Error as e:
-        raise ValueError("what it spells out as base64 is damaged") from e
+    return base64.b64decode(text, validate=True)
 
 
 def _matrix(node: dict[str, Any]) -> np.ndarray:
     """(4, 4) of a node relative to its parent."""
     if "matrix" in node:
         return np.array(node["matrix"], float).reshape(4, 4).T
-    x, y, z, w = np.array(node.get("rotation", [0, 0, 0, 1]), float)
-    turn = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
     out = np.eye(4)
+    turn = Rotation.from_quat(node.get("rotation", [0, 0, 0, 1])).as_matrix()
     out[:3, :3] = turn * np.array(node.get("scale", [1, 1, 1]), float)
     out[:3, 3] = node.get("translation", [0, 0, 0])
     return out

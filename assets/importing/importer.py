@@ -41,7 +41,7 @@ from embodied.assets.importing.obj import (
 from embodied.assets.importing.rounding import FINE, folded, is_coarse, refined, rounded
 from embodied.assets.importing.sh3f import Pack, PackError
 from embodied.assets.importing.textures import cut, filled, palette, shrunk, tinted
-from embodied.assets.json_file import read_json
+from embodied.assets.json_file import from_plain, read_json
 from embodied.assets.records import Finish, ImportRecipe, MeshPart, bounds
 
 log = logging.getLogger(__name__)
@@ -148,7 +148,7 @@ def read_obj(
     own, say = tell is not None, tell or (lambda words: None)
     materials: dict[str, MtlMaterial] = {}
     for statement in obj.libraries:
-        whole, *several = (_read_if_there(read, n) for n in _library_names(folder, statement))
+        whole, *several = (read_if_there(read, n) for n in _library_names(folder, statement))
         contents = [data for data in (several if whole is None else [whole]) if data is not None]
         if not contents:
             say(f"its material library {statement!r} is not there; put it beside the model")
@@ -254,7 +254,7 @@ def obj_files(read: Reader, name: str) -> tuple[str, ...]:
     for statement in libraries(decoded(read(name))):
         for library in _library_names(folder, statement):
             files.append(library)
-            for m in parse_mtl(decoded(_read_if_there(read, library) or b"")).values():
+            for m in parse_mtl(decoded(read_if_there(read, library) or b"")).values():
                 files += [_texture_name(folder, t.name) for t in (m.texture, m.opacity_map) if t is not None]
     return tuple(dict.fromkeys(files))
 
@@ -268,7 +268,7 @@ def _texture_name(folder: PurePosixPath, texture: str) -> str:
     return str(folder / texture.replace("\\", "/"))
 
 
-def _read_if_there(read: Reader, name: str) -> bytes | None:
+def read_if_there(read: Reader, name: str) -> bytes | None:
     """The bytes of a file that models may do without; None where it is lost."""
     try:
         return read(name)
@@ -467,7 +467,7 @@ def _to_size(parts: list, size: tuple[float, float, float]) -> list:
 
 def _image(read: Reader, name: str, remedy: str) -> Image.Image | None:
     """The texture `name` at most MAX_TEXTURE wide, or None where the pack lost it."""
-    data = _read_if_there(read, name)
+    data = read_if_there(read, name)
     if data is None:
         return None
     with warnings.catch_warnings():
@@ -516,7 +516,8 @@ def _load(folder: Path, stem: str) -> tuple[tuple[MeshPart, ...], list[str]] | N
         files = {name: (folder / name).read_bytes() for name in manifest["sha256"]}
         if any(digest(data) != manifest["sha256"][name] for name, data in files.items()):
             return None
-        finishes = [_finish(row, folder) for row in manifest["finishes"]]
+        read = (from_plain(Finish, row) for row in manifest["finishes"])
+        finishes = [replace(f, texture=f.texture and str(folder / f.texture)) for f in read]
         with open_arrays(io.BytesIO(files[f"{stem}.npz"])) as arrays:
             parts = tuple(
                 MeshPart(arrays[f"v{i}"], arrays[f"f{i}"], arrays[f"n{i}"], arrays[f"t{i}"], finish)
@@ -525,15 +526,6 @@ def _load(folder: Path, stem: str) -> tuple[tuple[MeshPart, ...], list[str]] | N
         return parts, [str(words) for words in manifest["words"]]
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
         return None
-
-
-def _finish(row: dict, folder: Path) -> Finish:
-    row = dict(row, color=tuple(row["color"]))
-    if row["texture"] is not None:
-        row["texture"] = str(folder / row["texture"])
-    if row["emission"] is not None:
-        row["emission"] = tuple(row["emission"])
-    return Finish(**row)
 
 
 def scaled(parts: tuple[MeshPart, ...], ratio: tuple[float, float, float]) -> tuple[MeshPart, ...]:

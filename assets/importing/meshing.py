@@ -9,12 +9,8 @@ from scipy.spatial import cKDTree
 CREASE = np.radians(42.0)
 """Faces that meet at less than this angle share a smooth normal."""
 
-MANY = 256
-"""Faces around one vertex above which they are taken together by direction; furniture has up to some 100."""
 PAIRS = 4_000_000
 """Pairs of corners compared at a time."""
-DIRECTION_CELLS = 8
-"""Cells of directions per unit: some 800 on the sphere, 7 degrees wide."""
 
 WORKING_SIZE, AGGRESSIVENESS = 50.0, 5.0
 """The simplifier's error thresholds are absolute, so parts are brought to this extent for it: at
@@ -52,11 +48,7 @@ def sound_faces(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 def crease_normals(vertices: np.ndarray, faces: np.ndarray, crease: float = CREASE) -> np.ndarray:
     """(m, 3, 3) unit normal of every corner: the mean, weighted by angle and area, over the faces
     around the vertex that turn from the corner's own face by less than `crease`. The areas keep
-    large flat panels flat beside their small bevels.
-
-    Time and memory grow with the number of corners: at a vertex where more than MANY faces meet,
-    they are taken together by direction (`_hub_sums`).
-    """
+    large flat panels flat beside their small bevels."""
     unit = face_normals(vertices, faces)
     area = np.linalg.norm(unit, axis=1, keepdims=True)
     unit /= np.maximum(area, 1e-30)
@@ -65,13 +57,10 @@ def crease_normals(vertices: np.ndarray, faces: np.ndarray, crease: float = CREA
     corner_vertex = faces.reshape(-1)
     normal = np.empty((len(corner_vertex), 3))
     around = _Around(corner_vertex, np.argsort(corner_vertex, kind="stable"), len(vertices))
-    few = np.flatnonzero(around.counts[corner_vertex] <= MANY)
-    pairs = np.cumsum(around.counts[corner_vertex[few]])
-    for chunk in np.split(few, np.searchsorted(pairs, np.arange(PAIRS, pairs[-1] if len(few) else 0, PAIRS))):
+    pairs = np.cumsum(around.counts[corner_vertex])
+    ends = np.searchsorted(pairs, np.arange(PAIRS, pairs[-1] if len(pairs) else 0, PAIRS))
+    for chunk in np.split(np.arange(len(corner_vertex)), ends):
         normal[chunk] = _corner_sums(chunk, around, unit, weight, np.cos(crease))
-    for hub in np.flatnonzero(around.counts > MANY):
-        corners = around.order[around.starts[hub] : around.starts[hub] + around.counts[hub]]
-        normal[corners] = _hub_sums(unit[corners // 3], weight[corners], np.cos(crease))
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.where(length > 1e-15, normal / np.maximum(length, 1e-15), np.repeat(unit, 3, axis=0))
     return normal.reshape(-1, 3, 3)
@@ -98,20 +87,6 @@ def _corner_sums(
     row, other = row[cosine > least], other[cosine > least]
     sums = [np.bincount(row, unit[other // 3, k] * weight[other], minlength=len(corners)) for k in range(3)]
     return np.stack(sums, axis=1)
-
-
-def _hub_sums(unit: np.ndarray, weight: np.ndarray, least: float) -> np.ndarray:
-    """As `_corner_sums` for the k corners of one vertex: normals (k, 3) that fall into the same small
-    cell count as one direction, so that no more than some hundreds are compared with one another."""
-    _, cell = np.unique(np.round(unit * DIRECTION_CELLS).astype(np.int64), axis=0, return_inverse=True)
-    cell = cell.reshape(-1)
-    sums = np.stack([np.bincount(cell, unit[:, k] * weight) for k in range(3)], axis=1)
-    middle = np.stack([np.bincount(cell, unit[:, k]) for k in range(3)], axis=1)
-    middle = middle / np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-30)
-    smooth = np.concatenate(
-        [(rows @ middle.T > least) @ sums for rows in np.array_split(middle, 1 + len(middle) // 512)]
-    )
-    return smooth[cell]
 
 
 def corner_angles(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 from embodied.assets import rows
 from embodied.assets.cache import digest
 from embodied.assets.importing.glb import read_glb
-from embodied.assets.importing.importer import Reader, cached, obj_files, read_obj
+from embodied.assets.importing.importer import Reader, cached, obj_files, read_if_there, read_obj
 from embodied.assets.importing.mtl_finish import corrected
 from embodied.assets.importing.obj import MeshError
 from embodied.assets.importing.sh3f import MAX_ENTRY, open_pack
@@ -108,17 +108,10 @@ def source_digest(model: OwnModel) -> str:
         if model.file.suffix.lower() != ".obj":
             return digest(model.file)
         read = _reader(model.file)
-        files = [(name, _digest_of(read, name)) for name in obj_files(read, model.file.name)]
-        return digest(model.file, files)
+        files = {name: read_if_there(read, name) for name in obj_files(read, model.file.name)}
+        return digest(model.file, [(name, None if data is None else digest(data)) for name, data in files.items()])
     except OSError as e:
         raise MeshError(f"{model.file} cannot be read ({e.strerror or e}); put it back, or correct its rights") from e
-
-
-def _digest_of(read: Reader, name: str) -> str | None:
-    try:
-        return digest(read(name))
-    except FileNotFoundError:
-        return None
 
 
 def _reader(path: Path) -> Reader:

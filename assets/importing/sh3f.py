@@ -80,10 +80,6 @@ class Pack:
             raise PackError(f"{self.path.name}: entry {name!r} unpacks to over {MAX_ENTRY} bytes; do not use this pack")
         return data
 
-    def names(self) -> tuple[str, ...]:
-        with zipfile.ZipFile(self.path) as z:
-            return tuple(z.namelist())
-
 
 @functools.lru_cache(maxsize=8)
 def _opened(path: Path, changed: int, process: int) -> zipfile.ZipFile:

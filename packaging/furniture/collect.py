@@ -24,7 +24,8 @@ STAMP = (2020, 12, 22, 0, 0, 0)
 
 def needed(pack: Pack, models: frozenset[str]) -> list[str]:
     """Names of the entries of `pack` that its models in `models` consist of, and of its licences, sorted."""
-    names = set(pack.names())
+    with zipfile.ZipFile(pack.path) as z:
+        names = set(z.namelist())
     kept = {CATALOGUE, *(n for n in names if n.lower().endswith(".txt"))}
     for key in models & pack.entries.keys():
         obj = pack.entries[key].model

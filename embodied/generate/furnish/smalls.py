@@ -1,4 +1,4 @@
-"""SmallObject things on tables, shelves, walls and floors: what stands there, and what the household leaves there.
+"""Small things on tables, shelves, walls and floors: what stands there, and what the household leaves there.
 
 smalls.toml says what there is: kettles on worktops, shoes at the door, dishes by the sink, clothes on a chair.
 """
