@@ -35,28 +35,6 @@ def maps_of(color: np.ndarray, roughness: np.ndarray | float, darkest: float = 0
 # ------------------------------------------------------------------ noise
 
 
-def noise(n: int, across: float, down: float, *, rng: np.random.Generator) -> np.ndarray:
-    """Periodic Gaussian noise, unit variance, with correlation lengths in pixels across and down."""
-    return filtered(n, lambda fx, fy: np.exp(-((fx * across) ** 2 + (fy * down) ** 2) * 4.9), rng=rng)
-
-
-def fbm(
-    n: int, low: float, high: float, slope: float = 1.6, stretch: float = 1.0, *, rng: np.random.Generator
-) -> np.ndarray:
-    """Periodic fractal noise, unit variance: amplitude f^-slope from `low` to `high` cycles per tile.
-
-    Nothing slower than `low` remains, so that the tile shows no blob that the eye can count.
-    stretch: how many times longer its features are across (x) than down (y).
-    """
-
-    def band(fx: np.ndarray, fy: np.ndarray) -> np.ndarray:
-        f = np.hypot(fx * stretch, fy) * n
-        falling = np.where(f > 0, np.maximum(f, 1e-3) ** -slope, 0)
-        return falling * (1 - np.exp(-((f / low) ** 4))) * np.exp(-((f / high) ** 2))
-
-    return filtered(n, band, rng=rng)
-
-
 def filtered(n: int, band: Callable[[np.ndarray, np.ndarray], np.ndarray], *, rng: np.random.Generator) -> np.ndarray:
     """White noise through the transfer function `band(fx, fy)`, frequencies in cycles per pixel."""
     white = rng.standard_normal((n, n), dtype=np.float32)
@@ -116,12 +94,23 @@ class Canvas:
     rng: np.random.Generator
 
     def noise(self, across: float, down: float) -> np.ndarray:
-        """As `noise`."""
-        return noise(self.n, across, down, rng=self.rng)
+        """Periodic Gaussian noise, unit variance, with correlation lengths in pixels across and down."""
+        band = lambda fx, fy: np.exp(-((fx * across) ** 2 + (fy * down) ** 2) * 4.9)
+        return filtered(self.n, band, rng=self.rng)
 
     def fbm(self, low: float, high: float, slope: float = 1.6, stretch: float = 1.0) -> np.ndarray:
-        """As `fbm`."""
-        return fbm(self.n, low, high, slope, stretch, rng=self.rng)
+        """Periodic fractal noise, unit variance: amplitude f^-slope from `low` to `high` cycles per tile.
+
+        Nothing slower than `low` remains, so that the tile shows no blob that the eye can count.
+        stretch: how many times longer its features are across (x) than down (y).
+        """
+
+        def band(fx: np.ndarray, fy: np.ndarray) -> np.ndarray:
+            f = np.hypot(fx * stretch, fy) * self.n
+            falling = np.where(f > 0, np.maximum(f, 1e-3) ** -slope, 0)
+            return falling * (1 - np.exp(-((f / low) ** 4))) * np.exp(-((f / high) ** 2))
+
+        return filtered(self.n, band, rng=self.rng)
 
     def coordinates(self) -> tuple[np.ndarray, np.ndarray]:
         """As `coordinates`."""
@@ -147,11 +136,11 @@ class Places:
     """(n, n), in tiles."""
 
     def noise(self, across: float, down: float) -> np.ndarray:
-        """As `noise`, at these places."""
+        """As Canvas.noise, at these places."""
         return look_up(self.on.noise(across, down), self.x, self.y)
 
     def fbm(self, low: float, high: float, slope: float = 1.6, stretch: float = 1.0) -> np.ndarray:
-        """As `fbm`, at these places."""
+        """As Canvas.fbm, at these places."""
         return look_up(self.on.fbm(low, high, slope, stretch), self.x, self.y)
 
 
