@@ -25,10 +25,11 @@ from embodied.assets.importing.importer import import_model, scaled
 from embodied.assets.importing.own import OwnModel, import_own, read_own, source_digest
 from embodied.assets.importing.packs import find_packs, pack_of
 from embodied.assets.importing.sh3f import open_pack
+from embodied.assets.json_file import RecordError
 from embodied.assets.records import Asset, Finish, ImportRecipe, MeshPart
-from embodied.assets.rows import DATA, CatalogueError, check_classes, read_json, read_models
+from embodied.assets.rows import DATA, check_classes, read_json, read_models
 
-__all__ = ["Catalogue", "CatalogueError", "load_catalogue"]
+__all__ = ["Catalogue", "load_catalogue"]
 
 log = logging.getLogger(__name__)
 GROUPS = "groups.toml"
@@ -92,7 +93,7 @@ class Catalogue:
         """A catalogue that has these assets and no others.
 
         Raises:
-          CatalogueError: unknown key.
+          RecordError: unknown key.
         """
         kept = {key: self._asset(key) for key in keys}
         return Catalogue(kept, self._recipes, self.cache, self._own, self.groups)
@@ -112,7 +113,7 @@ class Catalogue:
         """The parts of an asset at `size` (its own if None); the caller must not change the arrays.
 
         Raises:
-          CatalogueError: unknown key.
+          RecordError: unknown key.
           PackError, MeshError: the model's pack is missing or damaged.
         """
         own = self._asset(key).size
@@ -123,7 +124,7 @@ class Catalogue:
         """The params that a built asset takes, with its usual values; empty for models.
 
         Raises:
-          CatalogueError: unknown key.
+          RecordError: unknown key.
         """
         self._asset(key)
         return BUILT_ASSETS[key].params if key not in self._recipes else {}
@@ -156,7 +157,7 @@ class Catalogue:
 
     def _asset(self, key: str) -> Asset:
         if key not in self.assets:
-            raise CatalogueError(f"no asset {key!r} among {len(self.assets)}; `embodied assets list` names them all")
+            raise RecordError(f"no asset {key!r} among {len(self.assets)}; `embodied assets list` names them all")
         return self.assets[key]
 
     def _import(self, key: str) -> tuple[MeshPart, ...]:
@@ -214,7 +215,7 @@ def load_catalogue(cache: Path | None = None, *, own: Sequence[Path] | Path | st
                 continue
         more, more_recipes, more_models = read_own(folder, classes)
         if twice := sorted(set(more) & set(assets)):
-            raise CatalogueError(f'{folder} has the keys {twice}, which are taken; give it another "pack" name')
+            raise RecordError(f'{folder} has the keys {twice}, which are taken; give it another "pack" name')
         assets, recipes, models = assets | more, recipes | more_recipes, models | more_models
     catalogue = Catalogue(assets, recipes, cache or default_cache(), models, groups)
     for name in catalogue.own_classes:

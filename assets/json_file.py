@@ -182,6 +182,8 @@ def _hints(kind: type) -> dict[str, object]:
 
 
 def _build(kind: typing.Any, value: object, where: str) -> typing.Any:
+    if kind in TYPE_WORDS:
+        return _build_plain(kind, value, where)
     origin, args = typing.get_origin(kind), typing.get_args(kind)
     if kind in (object, typing.Any):
         return value
@@ -202,11 +204,15 @@ def _build(kind: typing.Any, value: object, where: str) -> typing.Any:
             raise RecordError(f"{where} should be one of {[m.value for m in kind]}, got {shown(value)}") from e
     if dataclasses.is_dataclass(kind):
         return _build_record(typing.cast(type, kind), value, where)
-    if kind in (int, float) and isinstance(value, (int, float)) and not isinstance(value, bool):
-        if kind is float and not abs(value) <= LARGEST_NUMBER:  # NaN too
+    return _build_plain(kind, value, where)
+
+
+def _build_plain(kind: typing.Any, value: typing.Any, where: str) -> typing.Any:
+    if kind is float and type(value) in (int, float):
+        if not abs(value) <= LARGEST_NUMBER:  # NaN too
             raise RecordError(f"{where} should be a finite number of at most {LARGEST_NUMBER:g}, got {shown(value)}")
-        value = float(value) if kind is float else value
-    if not isinstance(kind, type) or type(value) is not kind:
+        value = float(value)
+    if type(value) is not kind:
         raise RecordError(f"{where} should be {TYPE_WORDS.get(kind) or _name(kind)}, got {shown(value)}")
     return value
 

@@ -1,16 +1,16 @@
-"""Rows of the tables in assets/data and of users' catalogue.json: read, checked, made Assets and Recipes."""
+"""Rows of the tables in assets/data and of users' catalogue.json: laid over one another, made Assets and Recipes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+import dataclasses
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any
 
 from embodied.assets import json_file
-from embodied.assets.json_file import RecordError
-from embodied.assets.records import ROOM_KINDS, SUPPORTS, Asset, ImportRecipe, SupportSurface
+from embodied.assets.json_file import RECORD_RULES, RecordError, from_plain, shown
+from embodied.assets.records import ROOM_KINDS, SUPPORTS, Asset, ImportRecipe, Size, SupportSurface
 
 Row = dict[str, Any]
 """One JSON object of a table."""
@@ -18,160 +18,80 @@ Row = dict[str, Any]
 DATA = Path(__file__).parent / "data"
 SIZES = (0.001, 30.0)
 """Shortest and longest side of a thing, metres."""
-
-
-class CatalogueError(RecordError):
-    """A catalogue that cannot be read: says what was expected, what came and what to do."""
-
-
-@dataclass(frozen=True)
-class Field:
-    """A field of a row, and the values that it may have."""
-
-    what: str
-    """In words, for the error message."""
-    holds: Callable[[Any], bool]
-
-
-def is_number(value: object, low: float = -1e6, high: float = 1e6) -> bool:
-    """True if a JSON value is a number from `low` to `high`; neither NaN nor true nor 400 digits long."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and low <= value <= high
-
-
-def is_text(value: object, most: int = 200) -> bool:
-    """True if a JSON value is one line of text that can be printed and encoded."""
-    return isinstance(value, str) and value.isprintable() and len(value) <= most
-
-
-def is_list(value: object, holds: Callable[[Any], bool], count: int | None = None) -> bool:
-    """True if a JSON value is a list (of `count` entries, if given) of values that `holds` accepts."""
-    return isinstance(value, list) and count in (None, len(value)) and all(holds(v) for v in value)
-
-
-def _is_surface(value: object) -> bool:
-    if not (isinstance(value, list) and len(value) == 7 and is_text(value[0])):
-        return False
-    _, z, x0, y0, x1, y1, headroom = value
-    return all(is_number(v, -30.0, 30.0) for v in value[1:]) and x0 < x1 and y0 < y1 and headroom > 0
-
-
-def _is_object(value: object, holds: Callable[[Any, Any], bool]) -> bool:
-    return isinstance(value, dict) and all(holds(k, v) for k, v in value.items())
-
-
-LINE_OF_TEXT = Field("one line of text of at most 200 characters", is_text)
-WORD = Field("a word or more", lambda v: is_text(v) and bool(v.strip()))
-WORD_LIST = Field("a list of words", lambda v: is_list(v, is_text))
-LENGTH = Field("a length from 0 to 30 metres", lambda v: is_number(v, 0.0, 30.0))
-SIZE_FIELD = Field(
-    f"a size of three lengths in metres, each from {SIZES[0]:g} to {SIZES[1]:g}",
-    lambda v: is_list(v, lambda s: is_number(s, *SIZES), 3),
-)
-LOOK = Field("an object of words and numbers", lambda v: _is_object(v, lambda _, x: is_text(x) or is_number(x)))
-WEIGHTS = Field(
-    f"room kinds with weights from 0 up; the room kinds are {', '.join(ROOM_KINDS)}",
-    lambda v: _is_object(v, lambda kind, weight: kind in ROOM_KINDS and is_number(weight, 0.0)),
-)
-SUPPORT = Field(f"one of {', '.join(SUPPORTS)}", lambda v: v in SUPPORTS)
-FIELDS = {
-    "class": WORD,
-    "name": WORD,
-    "size": SIZE_FIELD,
-    "support": SUPPORT,
-    "rooms": WEIGHTS,
-    "synonyms": WORD_LIST,
-    "on": WORD_LIST,
-    "clearance": LENGTH,
-    "tags": WORD_LIST,
-    "elevation": LENGTH,
-    "colours": WORD_LIST,
-    "materials": WORD_LIST,
-    "surfaces": Field(
-        "a list of [name, z, x0, y0, x1, y1, headroom], metres, x0 < x1 and y0 < y1", lambda v: is_list(v, _is_surface)
-    ),
-    "emits": Field(
-        "three numbers from 0 up, or null", lambda v: v is None or is_list(v, lambda x: is_number(x, 0.0), 3)
-    ),
-    "creator": LINE_OF_TEXT,
-    "licence": LINE_OF_TEXT,
-    "lamp": Field("a point of three numbers, or null", lambda v: v is None or is_list(v, is_number, 3)),
-    "yaw": Field("a number of degrees", is_number),
-    "glow": WORD_LIST,
-    "two_sided": WORD_LIST,
-    "flipped": WORD_LIST,
-    "dropped": WORD_LIST,
-    "looks": Field(
-        "an object of material names and words", lambda v: _is_object(v, lambda k, x: is_text(k) and is_text(x))
-    ),
-    "faces": Field("a whole number from 0 up", lambda v: is_number(v, 0) and v == int(v)),
-    "of": WORD,
-}
-"""Fields of a line of a catalogue; from `yaw` on it tells the importer."""
-REMADE_FIELDS = {"build": WORD, "look": LOOK}
+LONGEST_TEXT = 200
+CLASS_FIELDS = ("support", "rooms", "synonyms", "on", "clearance", "tags")
+ASSET_FIELDS = {f.name for f in dataclasses.fields(Asset)} - {"key", "object_class", "pack"}
+"""Fields of a row that are the asset's own; its 'class' is the `object_class`."""
+RECIPE_FIELDS = {"yaw", "two_sided", "flipped", "glow", "dropped", "looks", "faces"}
+"""Fields of a row that tell the importer."""
+REMADE_FIELDS = {"build", "look"}
 """Further fields of a line of data/catalogue.json, where code builds what the pack's model is too poor for."""
 REMADE_LICENCE = "Apache-2.0"
 """Of meshes that code builds."""
-CLASS_FIELDS = ("support", "rooms", "synonyms", "on", "clearance", "tags")
 
 
 def read_json(path: Path) -> Row:
     """The JSON object in `path`.
 
     Raises:
-      CatalogueError: missing, not readable, not JSON, or not an object.
+      RecordError: missing, not readable, not JSON, or not an object.
     """
     try:
         return json_file.read_json(path)
-    except FileNotFoundError as e:
-        raise CatalogueError(f"{path} does not exist; docs/assets.md shows what it should hold") from e
     except OSError as e:  # a folder, no permission, a symbolic link to itself
-        raise CatalogueError(f"{path} cannot be read ({e.strerror or e}); it should be a file of JSON") from e
-    except RecordError as e:
-        raise CatalogueError(str(e)) from e
+        raise RecordError(f"{path} cannot be read ({e.strerror or e}); docs/assets.md shows what it should hold") from e
 
 
-def check_row(where: str, row: object, fields: Mapping[str, Field]) -> Row:
-    """`row` itself if it is an object whose fields are all known and hold what they should.
+def one_of(where: str, name: str, value: object, choices: Collection[str]) -> Any:
+    """`value`, if it is one of `choices`; raises RecordError with what the row at `where` should say."""
+    if not isinstance(value, str) or value not in choices:
+        raise RecordError(f"{where} should have a {name!r} out of {', '.join(sorted(choices))}, got {shown(value)}")
+    return value
 
-    Args:
-      where: what the row is called in error messages.
 
-    Raises:
-      CatalogueError: says which field is wrong, and what it should hold.
-    """
-    if not isinstance(row, dict):
-        raise CatalogueError(f"{where} should be an object, got {shown(row)}")
-    if unknown := sorted(set(row) - set(fields)):
-        raise CatalogueError(f"{where} has the unknown fields {unknown}; it may hold {list(fields)}")
-    for name, value in row.items():
-        if not fields[name].holds(value):
-            raise CatalogueError(f"{where}: {name!r} should be {fields[name].what}, got {shown(value)}")
+def only(where: str, row: Row, names: Collection[str]) -> Row:
+    """`row`, if it has these fields and no others; raises RecordError."""
+    if unknown := sorted(set(row) - set(names)):
+        raise RecordError(f"{where} has the unknown fields {unknown}; it may hold {sorted(names)}")
     return row
 
 
-def shown(value: object) -> str:
-    """`value` as an error message may show it: short, whatever somebody put into a file."""
-    if isinstance(value, int) and abs(value) > 10**18:
-        return "a number of more than 18 digits"
-    text = repr(value) if not isinstance(value, (list, dict)) or len(value) < 20 else type(value).__name__
-    return text if len(text) <= 120 else text[:117] + "..."
+def _wrong_asset(asset: Asset) -> str | None:
+    words = (*asset.synonyms, *asset.colours, *asset.materials, *asset.on, *asset.tags, asset.creator, asset.licence)
+    names = (asset.key, asset.object_class, asset.name)
+    rules = {
+        f"'size' should be three lengths in metres, each from {SIZES[0]:g} to {SIZES[1]:g}": all(
+            SIZES[0] <= s <= SIZES[1] for s in asset.size
+        ),
+        f"'support' should be one of {', '.join(SUPPORTS)}": asset.support in SUPPORTS,
+        f"'rooms' should be room kinds with weights from 0 up; the room kinds are {', '.join(ROOM_KINDS)}": all(
+            kind in ROOM_KINDS and weight >= 0 for kind, weight in asset.rooms.items()
+        ),
+        "'elevation' and 'clearance' should be lengths from 0 to 30 metres": all(
+            0 <= length <= 30 for length in (asset.elevation, asset.clearance)
+        ),
+        "'surfaces' should be lists [name, z, x0, y0, x1, y1, headroom], x0 < x1 and y0 < y1": all(
+            s.x0 < s.x1 and s.y0 < s.y1 and s.headroom > 0 for s in asset.surfaces
+        ),
+        "'emits' should be three numbers from 0 up": min(asset.emits or (0.0,)) >= 0,
+        f"words should be lines of at most {LONGEST_TEXT} characters, and names not be empty": all(
+            word.isprintable() and len(word) <= LONGEST_TEXT for word in (*words, *names)
+        )
+        and all(name.strip() for name in names),
+    }
+    return next((rule for rule, holds in rules.items() if not holds), None)
 
 
-def check_classes(where: str, classes: object) -> Mapping[str, Row]:
-    """The shared fields of object classes, if they make sense; `where` names their file."""
-    for name, row in objects(where, "classes", classes).items():
-        check_row(f"{where}: class {name!r}", row, {f: FIELDS[f] for f in CLASS_FIELDS})
-    return objects(where, "classes", classes)
+RECORD_RULES[Asset] = _wrong_asset
+RECORD_RULES[ImportRecipe] = lambda recipe: None if recipe.faces >= 0 else "'faces' should be a whole number from 0 up"
 
 
-def objects(where: str, name: str, value: object) -> Mapping[str, Row]:
-    """`value` if it is an object of named objects."""
-    if not isinstance(value, dict) or not all(is_text(k, 80) and k.strip() for k in value):
-        raise CatalogueError(f"{where}: {name!r} should be an object of named rows, got {shown(value)}")
-    for key, row in value.items():
-        if not isinstance(row, dict):
-            raise CatalogueError(f"{where}: {name!r}: {key!r} should be an object, got {shown(row)}")
-    return value
+def check_classes(where: str, classes: Mapping[str, Row]) -> Mapping[str, Row]:
+    """The shared fields of object classes, if things may have them; `where` names their file."""
+    for name, row in classes.items():
+        thing = f"{where}: class {name!r}"
+        asset_of(thing, name, {"class": name, "size": [1, 1, 1], "support": "floor"} | only(thing, row, CLASS_FIELDS))
+    return classes
 
 
 def read_models(
@@ -186,47 +106,37 @@ def read_models(
     assets, recipes = {}, {}
     for key, given in rows.items():
         model = f"{where}: model {key!r}"
-        row = check_row(model, given, FIELDS | REMADE_FIELDS)
+        row = only(model, given, {"class", "of"} | ASSET_FIELDS | RECIPE_FIELDS | REMADE_FIELDS)
         if "of" in row:
             row = variant(model, row, rows)
         if row.get("class") not in classes:
-            raise CatalogueError(f"{model} has the unknown class {row.get('class')!r}; use one of data/classes.json")
+            raise RecordError(f"{model} has the unknown class {row.get('class')!r}; use one of data/classes.json")
         shared = classes[row["class"]]
         tags = list(dict.fromkeys((*shared.get("tags", ()), *row.get("tags", ()))))
         licence = REMADE_LICENCE if "build" in row else licences.get(key.split("/")[0], "")
-        assets[key] = asset_of(model, key, {"licence": licence} | shared | row | {"tags": tags})
+        asset = assets[key] = asset_of(model, key, {"licence": licence} | shared | row | {"tags": tags})
         if "build" not in row:
-            recipes[key] = _recipe(assets[key], row)
+            told = {name: value for name, value in row.items() if name in RECIPE_FIELDS}
+            looks = from_plain(Mapping[str, str], told.pop("looks", {}), f"{model}: 'looks'")
+            recipe = from_plain(
+                ImportRecipe, {"key": key, "size": list(asset.size), "model": row.get("of", "")} | told, model
+            )
+            recipes[key] = dataclasses.replace(recipe, emits=asset.emits, looks=tuple(sorted(looks.items())))
     return assets, recipes
 
 
 def asset_of(where: str, key: str, row: Mapping[str, Any]) -> Asset:
-    """The asset that a checked row describes, on its own."""
-    for name in ("size", "support"):
-        if name not in row:
-            raise CatalogueError(f"{where} should have {FIELDS[name].what} as its {name!r}, got none")
-    x, y, z = row["size"]
-    return Asset(
-        key=key,
-        object_class=row["class"],
-        name=row.get("name", row["class"]),
-        size=(float(x), float(y), float(z)),
-        support=row["support"],
-        rooms={k: float(row["rooms"][k]) for k in ROOM_KINDS if k in row.get("rooms", {})},
-        synonyms=tuple(row.get("synonyms", ())),
-        colours=tuple(row.get("colours", ())),
-        materials=tuple(row.get("materials", ())),
-        on=tuple(row.get("on", ())),
-        elevation=float(row.get("elevation", 0.0)),
-        clearance=float(row.get("clearance", 0.0)),
-        surfaces=tuple(SupportSurface(str(s[0]), *(float(v) for v in s[1:])) for s in row.get("surfaces", ())),
-        tags=tuple(row.get("tags", ())),
-        emits=_three(row.get("emits")),
-        lamp=_three(row.get("lamp")),
-        pack=key.split("/")[0],
-        creator=row.get("creator", ""),
-        licence=row.get("licence", ""),
-    )
+    """The asset that a row describes, on its own.
+
+    Raises:
+      RecordError: says which field is wrong, and what it should hold.
+    """
+    said = {name: value for name, value in row.items() if name in ASSET_FIELDS}
+    names = [f.name for f in dataclasses.fields(SupportSurface)]
+    if isinstance(surfaces := row.get("surfaces"), list):
+        said["surfaces"] = [dict(zip(names, s)) if isinstance(s, list) else s for s in surfaces]
+    usual = {"key": key, "pack": key.split("/")[0], "object_class": row["class"], "name": row["class"]}
+    return from_plain(Asset, usual | said, where)
 
 
 def made_in(*modules: ModuleType) -> Mapping[str, Any]:
@@ -253,38 +163,20 @@ def merged(*rows: Mapping[str, Any], deep: Collection[str] = ()) -> Row:
 
 def variant(where: str, row: Row, rows: Mapping[str, Row]) -> Row:
     """`row` filled up from the model it is a variant of; surfaces and lamp follow its size."""
-    base = rows.get(row["of"])
-    if base is None or "of" in base:
-        raise CatalogueError(f"{where} should be a variant `of` a model in the same file, got {row['of']!r}")
-    check_row(where, base, FIELDS | REMADE_FIELDS)
-    if "size" not in base:
-        raise CatalogueError(f"{where} is a variant of {row['of']!r}, which should have {SIZE_FIELD.what}, got none")
-    out = merged(base, row, deep=("look", "looks"))
-    x, y, z = (n / o for n, o in zip(out["size"], base["size"]))
+    said = rows.get(str(row["of"]), {"of": ""})
+    if "of" in said:
+        raise RecordError(f"{where} should be a variant `of` a model in the same file, got {shown(row['of'])}")
+    base = asset_of(where, row["of"], {"class": "", "support": "floor"} | said)
+    out = merged(said, row, deep=("look", "looks"))
+    x, y, z = (n / o for n, o in zip(from_plain(Size, out["size"], f"{where}: 'size'"), base.size))
     out["surfaces"] = row.get("surfaces") or [
-        [s[0], *(round(v * f, 4) for v, f in zip(s[1:6], (z, x, y, x, y))), s[6] if s[6] >= 9 else round(s[6] * z, 4)]
-        for s in base.get("surfaces", ())
+        [
+            s.name,
+            *(round(v * f, 4) for v, f in zip((s.z, s.x0, s.y0, s.x1, s.y1), (z, x, y, x, y))),
+            s.headroom if s.headroom >= 9 else round(s.headroom * z, 4),
+        ]
+        for s in base.surfaces
     ]
-    if base.get("lamp"):
-        out["lamp"] = row.get("lamp") or [v * f for v, f in zip(base["lamp"], (x, y, z))]
+    if base.lamp:
+        out["lamp"] = row.get("lamp") or [v * f for v, f in zip(base.lamp, (x, y, z))]
     return out
-
-
-def _recipe(asset: Asset, row: Row) -> ImportRecipe:
-    return ImportRecipe(
-        asset.key,
-        asset.size,
-        yaw=float(row.get("yaw", 0.0)),
-        two_sided=tuple(row.get("two_sided", ())),
-        flipped=tuple(row.get("flipped", ())),
-        glow=tuple(row.get("glow", ())),
-        emits=asset.emits,
-        dropped=tuple(row.get("dropped", ())),
-        looks=tuple(sorted(row.get("looks", {}).items())),
-        faces=int(row.get("faces", 0)),
-        model=row.get("of", ""),
-    )
-
-
-def _three(values: list[float] | None) -> tuple[float, float, float] | None:
-    return (values[0], values[1], values[2]) if values else None

@@ -19,8 +19,9 @@ from embodied.assets.importing.importer import finish_parts, read_obj
 from embodied.assets.importing.obj import MeshError, parse_obj
 from embodied.assets.importing.packs import find_packs
 from embodied.assets.importing.sh3f import CATALOGUE, MAX_ENTRY, PackError, open_pack
+from embodied.assets.json_file import RecordError
 from embodied.assets.records import ROOM_KINDS, SUPPORTS, ImportRecipe, bounds
-from embodied.assets.rows import DATA, CatalogueError
+from embodied.assets.rows import DATA
 from embodied.light.tracing.rays import rays_among
 
 SOME = (
@@ -172,7 +173,7 @@ def test_a_missing_pack_is_named_with_the_remedy_and_an_installed_one_is_found_b
 
 
 def test_an_unknown_asset_is_named(catalogue):
-    with pytest.raises(CatalogueError, match="no asset 'scopia/unicorn'"):
+    with pytest.raises(RecordError, match="no asset 'scopia/unicorn'"):
         catalogue.mesh("scopia/unicorn")
 
 

@@ -7,7 +7,6 @@ import pytest
 
 from embodied.assets.materials import MATERIALS
 from embodied.assets.materials.detail import pyramid
-from embodied.assets.materials.material import detail_of
 from embodied.assets.records import DETAILS
 from embodied.render.camera import Camera, camera_at
 from embodied.render.detail import Detail
@@ -42,9 +41,9 @@ def test_a_tile_is_one_in_the_mean_on_every_level_and_fades(kind):
 
 def test_materials_show_what_they_are():
     wanted = {"linen/0": "weave", "velvet/0": "nap", "terry/0": "nap", "oak/0": "pores", "leather/0": "pebbles"}
-    assert {key: detail_of(MATERIALS[key]) for key in wanted} == wanted
-    assert all(detail_of(m) in (None, *DETAILS) for m in MATERIALS.values())
-    assert detail_of(MATERIALS["chrome/0"]) is None
+    assert {key: MATERIALS[key].detail for key in wanted} == wanted
+    assert all(m.detail in (None, *DETAILS) for m in MATERIALS.values())
+    assert MATERIALS["chrome/0"].detail is None
 
 
 @pytest.mark.parametrize("kind", range(len(DETAILS)))

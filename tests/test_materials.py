@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from embodied.assets.json_file import RecordError
 from embodied.assets.materials import MATERIALS, fingerprint, finish, make_maps, of_role
 from embodied.assets.materials.registry import PAINTERS, painters_of, read_materials
-from embodied.assets.rows import CatalogueError
 
 PICTURES = ("art", "rug", "label")
 """Families that are shown once, not repeated."""
@@ -33,7 +33,7 @@ def one_of_each_recipe() -> list[str]:
     """One key per set of painters, so that every code path is tried once."""
     seen, keys = set(), []
     for key, m in MATERIALS.items():
-        path = frozenset(painters_of(m.told))
+        path = frozenset(painters_of(m.maps))
         if path not in seen and m.family not in PICTURES:
             seen.add(path)
             keys.append(key)
@@ -44,7 +44,7 @@ def one_of_each_recipe() -> list[str]:
 @pytest.mark.parametrize("key", one_of_each_recipe())
 def test_a_material_tiles_without_a_seam_and_its_maps_are_sane(key):
     n = MATERIALS[key].pixels // 2
-    maps = MATERIALS[key].recipe(n, MATERIALS[key].tile, rng=np.random.default_rng(3))
+    maps = MATERIALS[key].draw(n, rng=np.random.default_rng(3))
     assert maps.color.shape == (n, n, 3)
     assert maps.color.dtype == np.float32 and maps.color.min() > 0 and maps.color.max() < 1
     assert 0 < maps.roughness <= 1
@@ -122,7 +122,7 @@ def table(**changes) -> dict:
 
 def test_a_new_row_is_a_new_material():
     (material,) = read_materials("table", table()).values()
-    maps = material.recipe(64, 1.0, rng=np.random.default_rng(0))
+    maps = material.draw(64, rng=np.random.default_rng(0))
     assert material.name == "lime paint" and np.abs(maps.color.mean((0, 1)) - (0.6, 0.9, 0.2)).max() < 0.01
 
 
@@ -132,9 +132,9 @@ def test_what_a_group_shares_may_be_overridden_and_its_recipe_is_filled_up():
         "table",
         {"groups": [shared | {"rows": {"a/0": {"maps": {"color": [0.5, 0.5, 0.5]}}, "a/1": {**ROW, "tile": 2}}}]},
     )
-    rough = made["a/0"].recipe(64, 1.0, rng=np.random.default_rng(0)).roughness
+    rough = made["a/0"].draw(64, rng=np.random.default_rng(0)).roughness
     assert abs(rough - 0.3) < 0.02 and (made["a/0"].tile, made["a/1"].tile) == (1.0, 2.0)
-    assert made["a/1"].told == {"by": "surface.paint", "rough": 0.3, "color": [0.6, 0.9, 0.2]}
+    assert made["a/1"].maps == {"by": "surface.paint", "rough": 0.3, "color": [0.6, 0.9, 0.2]}
 
 
 @pytest.mark.parametrize(
@@ -143,21 +143,21 @@ def test_what_a_group_shares_may_be_overridden_and_its_recipe_is_filled_up():
         ({"role": ["rug"]}, "unknown fields"),
         ({"roles": ["flor"]}, "a list of roles"),
         ({"tile": 0}, "a length"),
-        ({"pixels": 1.5}, "whole number"),
+        ({"pixels": 1.5}, "should be an integer"),
         ({"maps": {"by": "surface.print"}}, 'should have a "by" out of'),
         ({"maps": {}}, 'should have a "by" out of'),
         ({"maps": {"by": "surface.paint", "colour": [1, 0, 0]}}, r"does not take \['colour'\]"),
     ],
 )
 def test_a_wrong_row_is_named_with_what_it_should_hold(changes, match):
-    with pytest.raises(CatalogueError, match=match) as caught:
+    with pytest.raises(RecordError, match=match) as caught:
         read_materials("table", table(**changes))
     assert "paint_lime/0" in str(caught.value)
 
 
 def test_every_painter_of_the_table_exists_for_a_material():
     """What no row names is dead: a recipe, layout, face or motif that nobody sees."""
-    named = set().union(*(painters_of(m.told) for m in MATERIALS.values()))
+    named = set().union(*(painters_of(m.maps) for m in MATERIALS.values()))
     helpers = {p for p in PAINTERS if p.startswith("maps.")} | {"textile.folds", "wood.boards", "wood.Species"}
     assert set(PAINTERS) - helpers <= named
 
@@ -166,5 +166,5 @@ def test_painters_run_no_code_that_fingerprints_do_not_know():
     for module in {p.__module__ for p in PAINTERS.values()}:
         tree = ast.parse(Path(sys.modules[module].__file__).read_text())
         names = {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module}
-        allowed = {"embodied.assets.materials.maps", "embodied.assets.records"}
+        allowed = {f"embodied.assets.{name}" for name in ("json_file", "materials.maps", "records")}
         assert {n for n in names if n.startswith("embodied")} <= allowed, module

@@ -20,8 +20,8 @@ from embodied.assets.importing import importer
 from embodied.assets.importing.meshing import crease_normals
 from embodied.assets.importing.obj import MAX_CORNERS, MeshError, parse_obj
 from embodied.assets.importing.sh3f import PackError
+from embodied.assets.json_file import RecordError
 from embodied.assets.records import bounds
-from embodied.assets.rows import CatalogueError
 from embodied.house.house import Placement
 from embodied.navigation.graph import graph_of
 from embodied.world import open_world
@@ -159,15 +159,16 @@ WRONG_ROWS = {
     '"looks": {"paint": "shiny"}': "unknown look 'shiny'",
     '"surfaces": [["top", 0, 1, 1, 0, 0, 9]]': "x0 < x1",
     '"elevation": NaN': "NaN is no JSON",
-    '"synonyms": "cup"': "list of words",
-    '"yaw": "left"': "number of degrees",
-    '"faces": 1.5': "whole number",
+    '"synonyms": "cup"': "synonyms should be a list",
+    '"yaw": "left"': "yaw should be a number",
+    '"faces": 1.5': "should be an integer",
+    '"faces": -1': "whole number",
     '"name": "\\ud800"': "surrogates not allowed",
 }
 WRONG_CATALOGUES = {
-    '{"models": null}': "object of models",
+    '{"models": null}': "models should be an object",
     '{"models": {"box": 3}}': "should be an object",
-    '{"classes": {"mug": {"on": 3}}}': "list of words",
+    '{"classes": {"mug": {"on": 3}}}': "class 'mug'.on should be a list",
     '{"pack": "../up"}': "word without",
 }
 
@@ -185,7 +186,7 @@ def wrong_row(row: str) -> str:
 def test_a_wrong_catalogue_says_what_it_should_hold(tmp_path, text, match):
     (tmp_path / "a.obj").write_text(CUBE)
     (tmp_path / "catalogue.json").write_bytes(text.encode("latin-1"))
-    with pytest.raises(CatalogueError, match=match) as caught:
+    with pytest.raises(RecordError, match=match) as caught:
         load_catalogue(tmp_path / "cache", own=[tmp_path])
     assert "catalogue.json" in str(caught.value) and len(str(caught.value)) < 1500
 

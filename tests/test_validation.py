@@ -8,7 +8,8 @@ import functools
 import pytest
 from hand_worlds import generated
 
-from embodied.assets.catalogue import Catalogue, CatalogueError, load_catalogue
+from embodied.assets.catalogue import Catalogue, load_catalogue
+from embodied.assets.json_file import RecordError
 from embodied.assets.records import ROOM_KINDS
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.furnish.tables import tables
@@ -99,7 +100,7 @@ def test_parameters_are_those_of_the_maker():
     assert built["seed"] == 0.0 and built["art"] == "art_shapes/0"
     model = next(k for k in catalogue().assets if not k.startswith("built/"))
     assert catalogue().parameters(model) == {}
-    with pytest.raises(CatalogueError, match="no asset"):
+    with pytest.raises(RecordError, match="no asset"):
         catalogue().parameters("built/throne")
 
 

@@ -25,10 +25,11 @@ from embodied.assets.built import (
     storage,
     tableware,
 )
-from embodied.assets.built.parametric import LIGHTS, Build, ParametricAsset, ParamValues, built_parts, surface
+from embodied.assets.built.parametric import LIGHTS, Build, ParametricAsset, built_parts, surface
+from embodied.assets.json_file import RecordError, from_plain
 from embodied.assets.materials import MATERIALS
 from embodied.assets.records import Asset, SupportSurface
-from embodied.assets.rows import CatalogueError, Field, Row
+from embodied.assets.rows import Row
 
 BUILDS: Mapping[str, Build] = rows.made_in(
     *(appliances, basics, bath, decor, entry, everyday, fittings, kitchen),
@@ -39,38 +40,7 @@ SURFACES: Mapping[str, Callable[..., tuple[SupportSurface, ...]]] = MappingProxy
     {"shelves": storage.shelf_surfaces, "top": storage.top_surface}
 )
 """Support surfaces that follow from size and look."""
-SURFACE_NUMBERS = {"z", "width", "depth", "headroom", "margin", "x", "y"}
-
-
-def _is_surfaces(value: object) -> bool:
-    if isinstance(value, str):
-        return value in SURFACES
-    return isinstance(value, list) and all(
-        isinstance(s, dict)
-        and rows.is_text(s.get("name"))
-        and {"z", "width", "depth"} <= set(s)
-        and set(s) <= {"name", *SURFACE_NUMBERS}
-        and all(rows.is_number(s[n]) for n in set(s) & SURFACE_NUMBERS)
-        for s in value
-    )
-
-
-BUILT_FIELDS = {
-    **{
-        name: rows.FIELDS[name]
-        for name in ("class", "name", "size", "support", "on", "elevation", "clearance", "rooms")
-        + ("synonyms", "colours", "materials", "tags")
-    },
-    "build": Field(f"one of {', '.join(sorted(BUILDS))}", lambda v: v in BUILDS),
-    "surfaces": Field(
-        f"a list of {{name, z, width, depth, headroom, margin, x, y}}, or one of {sorted(SURFACES)}", _is_surfaces
-    ),
-    "emits": Field(f"one of {sorted(LIGHTS)}", lambda v: v in LIGHTS),
-    "after": rows.WORD,
-    "set": rows.WORD,
-    "look": rows.LOOK,
-}
-SET_FIELDS = {name: BUILT_FIELDS[name] for name in ("colours", "materials", "tags", "look")} | {"word": rows.WORD}
+BUILT_FIELDS = {"class", "build", "after", "set", "look"} | (rows.ASSET_FIELDS - {"lamp", "creator", "licence"})
 
 
 def read_built_assets(where: str, table: Row) -> Mapping[str, ParametricAsset]:
@@ -80,17 +50,16 @@ def read_built_assets(where: str, table: Row) -> Mapping[str, ParametricAsset]:
       where: name of the file, for error messages.
 
     Raises:
-      CatalogueError: a field that is unknown or holds what it should not, a key twice.
+      RecordError: a field that is unknown or holds what it should not, a key twice.
     """
-    sets = {name: rows.check_row(f"{where}: set {name!r}", row, SET_FIELDS) for name, row in table["sets"].items()}
     assets_by_key: dict[str, ParametricAsset] = {}
     for group in table["groups"]:
         shared = {name: value for name, value in group.items() if name != "rows"}
         for name, row in group["rows"].items():
             thing, key = f"{where}: {name!r}", f"built/{name}"
             if key in assets_by_key:
-                raise CatalogueError(f"{thing} stands there twice; give one of them another name")
-            assets_by_key[key] = _parametric_asset(thing, key, _whole(thing, shared, row, sets))
+                raise RecordError(f"{thing} stands there twice; give one of them another name")
+            assets_by_key[key] = _parametric_asset(thing, key, _whole(thing, shared, row, table["sets"]))
     return MappingProxyType(dict(sorted(assets_by_key.items())))
 
 
@@ -104,48 +73,45 @@ def remade(where: str, table: Mapping[str, Row], assets: Mapping[str, Asset]) ->
       assets: of these rows.
 
     Raises:
-      CatalogueError: a builder that does not exist.
+      RecordError: a builder that does not exist.
     """
     assets_by_key = {}
     for key, given in table.items():
-        row = rows.variant(f"{where}: model {key!r}", given, table) if "of" in given else given
+        row = rows.merged(table[given["of"]], given, deep=("look",)) if "of" in given else given
         if "build" in row:
-            rows.check_row(f"{where}: model {key!r}", {"build": row["build"]}, {"build": BUILT_FIELDS["build"]})
-            params: ParamValues = row.get("look", {})
-            make = functools.partial(built_parts, key, BUILDS[row["build"]], params)
-            assets_by_key[key] = ParametricAsset(assets[key], make, {"seed": 0.0, **params})
+            assets_by_key[key] = _parametric(f"{where}: model {key!r}", assets[key], row)
     return assets_by_key
 
 
 def _whole(where: str, shared: Row, row: Row, sets: Mapping[str, Row]) -> Row:
     """A row over its set over what its group shares, with the words of the material it is made after."""
-    rows.check_row(where, {**shared, **row}, BUILT_FIELDS)
-    chosen: Row = {}
-    word = ""
-    if "set" in row:
-        if row["set"] not in sets:
-            raise CatalogueError(f"{where} names the unknown set {row['set']!r}; use one of {sorted(sets)}")
-        chosen = {name: value for name, value in sets[row["set"]].items() if name != "word"}
-        word = sets[row["set"]]["word"]
+    chosen = dict(sets[rows.one_of(where, "set", row["set"], sets)]) if "set" in row else {}
+    word = chosen.pop("word", "")
     out = rows.merged(shared, chosen, row, deep=("look",))
     if "after" in out:
         key = out.get("look", {}).get(out["after"])
         if key not in MATERIALS:
-            raise CatalogueError(f"{where}: the look's {out['after']!r} should be a material's key, got {key!r}")
+            raise RecordError(f"{where}: the look's {out['after']!r} should be a material's key, got {key!r}")
         made_of = MATERIALS[key]
         word = made_of.name
         out = rows.merged({"colours": list(made_of.colours), "materials": list(made_of.materials)}, out)
     out["name"] = str(out.get("name", out["class"])).replace("{}", word)
-    return out
+    return rows.only(where, out, BUILT_FIELDS)
 
 
 def _parametric_asset(where: str, key: str, row: Row) -> ParametricAsset:
-    params: ParamValues = row.get("look", {})
     plain = {name: value for name, value in row.items() if name not in ("surfaces", "emits")}
     asset = rows.asset_of(where, key, plain | {"licence": rows.REMADE_LICENCE})
     given = row.get("surfaces", [])
-    surfaces = SURFACES[given](asset.size, params) if isinstance(given, str) else tuple(surface(**s) for s in given)
-    asset = dataclasses.replace(asset, surfaces=surfaces, emits=LIGHTS[row["emits"]] if "emits" in row else None)
-    return ParametricAsset(
-        asset, functools.partial(built_parts, key, BUILDS[row["build"]], params), {"seed": 0.0, **params}
-    )
+    if isinstance(given, str):
+        surfaces = SURFACES[rows.one_of(where, "surfaces", given, SURFACES)](asset.size, row.get("look", {}))
+    else:
+        surfaces = tuple(surface(**s) for s in given)
+    emits = LIGHTS[rows.one_of(where, "emits", row["emits"], LIGHTS)] if "emits" in row else None
+    return _parametric(where, dataclasses.replace(asset, surfaces=surfaces, emits=emits), row)
+
+
+def _parametric(where: str, asset: Asset, row: Row) -> ParametricAsset:
+    build = BUILDS[rows.one_of(where, "build", row["build"], BUILDS)]
+    params = from_plain(Mapping[str, str | int | float], row.get("look", {}), f"{where}: 'look'")
+    return ParametricAsset(asset, functools.partial(built_parts, asset.key, build, params), {"seed": 0.0, **params})

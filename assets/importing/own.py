@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from embodied.assets import rows
 from embodied.assets.cache import digest
@@ -13,20 +14,24 @@ from embodied.assets.importing.importer import Reader, cached, obj_files, read_i
 from embodied.assets.importing.mtl_finish import corrected
 from embodied.assets.importing.obj import MeshError
 from embodied.assets.importing.sh3f import MAX_ENTRY, open_pack
+from embodied.assets.json_file import RecordError, from_plain, shown
 from embodied.assets.records import Asset, Finish, ImportRecipe, MeshPart
-from embodied.assets.rows import CatalogueError, Field, Row
+from embodied.assets.rows import Row
 
 MODEL_SUFFIXES = (".glb", ".obj", ".sh3f")
-OWN_FIELDS = {
-    "pack": Field("a word without '/'", lambda v: rows.WORD.holds(v) and "/" not in v and "\\" not in v),
-    "licence": rows.LINE_OF_TEXT,
-    "creator": rows.LINE_OF_TEXT,
-    "classes": Field("an object of classes", lambda v: isinstance(v, dict)),
-    "models": Field("an object of models", lambda v: isinstance(v, dict)),
-}
-"""Fields of a user's catalogue.json."""
-ROW_FIELDS = rows.FIELDS | {"file": rows.LINE_OF_TEXT, "model": rows.LINE_OF_TEXT}
-"""Fields of a model in it."""
+OWN_FIELDS = {"class", "of", "file", "model"} | rows.ASSET_FIELDS | rows.RECIPE_FIELDS
+"""Fields of a model in a user's catalogue.json."""
+
+
+@dataclass(frozen=True)
+class _OwnCatalogue:
+    """The content of a user's catalogue.json."""
+
+    pack: str = ""
+    licence: str = ""
+    creator: str = ""
+    classes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    models: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -47,33 +52,33 @@ def read_own(
       classes: the object classes that exist; the folder may add its own.
 
     Raises:
-      CatalogueError: no catalogue.json, wrong fields, a file that is missing or outside the folder.
+      RecordError: no catalogue.json, wrong fields, a file that is missing or outside the folder.
     """
     path = folder / "catalogue.json"
-    body = rows.check_row(str(path), rows.read_json(path), OWN_FIELDS)
-    added = rows.check_classes(str(path), body.get("classes", {}))
-    models = rows.objects(str(path), "models", body.get("models", {}))
-    pack = body.get("pack", folder.name)
+    body = from_plain(_OwnCatalogue, rows.read_json(path), str(path))
+    added = rows.check_classes(str(path), body.classes)
+    pack = body.pack or folder.name
+    if "/" in pack or "\\" in pack:
+        raise RecordError(f"{path}: 'pack' should be a word without '/', got {shown(pack)}")
     rows_by_key, own = {}, {}
-    for name, given in models.items():
+    for name, given in body.models.items():
         where = f"{path}: model {name!r}"
-        key, row = f"{pack}/{name}", dict(rows.check_row(where, given, ROW_FIELDS))
-        if row.get("of") in models:
-            base = rows.check_row(where, models[row["of"]], ROW_FIELDS)
+        key, row = f"{pack}/{name}", rows.only(where, dict(given), OWN_FIELDS)
+        if base := body.models.get(str(row.get("of"))):
             row = {"file": base.get("file"), "model": base.get("model", ""), **row, "of": f"{pack}/{row['of']}"}
-        own[key] = _model(folder, where, row.pop("file", None), row.pop("model", ""))
-        row.setdefault("creator", body.get("creator", ""))
+        own[key] = _model(folder, where, row.pop("file", None), str(row.pop("model", "")))
+        row.setdefault("creator", body.creator)
         if own[key].entry and "size" not in row:
             row["size"] = list(open_pack(own[key].file).entries[own[key].entry].size)
         rows_by_key[key] = row
-    assets, recipes = rows.read_models(str(path), rows_by_key, {**classes, **added}, {pack: body.get("licence", "")})
+    assets, recipes = rows.read_models(str(path), rows_by_key, {**classes, **added}, {pack: body.licence})
     for recipe in recipes.values():
         for material, words in recipe.looks:
             try:
                 corrected(Finish(), words)
             except ValueError as e:
                 where = f"{path}: model {recipe.key.removeprefix(f'{pack}/')!r}"
-                raise CatalogueError(f"{where}: the looks of material {material!r}: {e}") from e
+                raise RecordError(f"{where}: the looks of material {material!r}: {e}") from e
     return assets, recipes, own
 
 
@@ -133,17 +138,14 @@ def _reader(path: Path) -> Reader:
     return read
 
 
-def _model(folder: Path, where: str, file: str | None, entry: str) -> OwnModel:
-    path = _inside(folder, file) if file else None
+def _model(folder: Path, where: str, file: object, entry: str) -> OwnModel:
+    path = _inside(folder, file) if isinstance(file, str) and file else None
     if path is None or path.suffix.lower() not in MODEL_SUFFIXES:
-        raise CatalogueError(f"{where} should name a file {MODEL_SUFFIXES} inside {folder}, got {rows.shown(file)}")
+        raise RecordError(f"{where} should name a file {MODEL_SUFFIXES} inside {folder}, got {shown(file)}")
     if not path.is_file():
-        raise CatalogueError(f"{where} names {file!r}, which is not in {folder}")
+        raise RecordError(f"{where} names {file!r}, which is not in {folder}")
     if path.suffix.lower() == ".sh3f":
-        entries = open_pack(path).entries
-        if entry not in entries:
-            raise CatalogueError(f'{where} should have a "model" out of {sorted(entries)}, got {entry!r}')
-        return OwnModel(path, entry)
+        return OwnModel(path, rows.one_of(where, "model", entry, open_pack(path).entries))
     return OwnModel(path)
 
 

@@ -14,8 +14,7 @@ from embodied.assets.closure import code_digest
 from embodied.assets.json_file import read_json
 from embodied.assets.materials import maps
 from embodied.assets.materials.maps import Maps
-from embodied.assets.materials.material import ROLES, Material, detail_of
-from embodied.assets.materials.registry import MATERIALS, PAINTERS, painters_of
+from embodied.assets.materials.registry import MATERIALS, PAINTERS, ROLES, Material, painters_of
 from embodied.assets.records import Finish
 
 __all__ = ["MATERIALS", "ROLES", "Maps", "Material", "finish", "make_maps", "of_role"]
@@ -39,7 +38,7 @@ def make_maps(key: str) -> Maps:
     material = _material(key)
     words = np.frombuffer(hashlib.sha256(key.encode()).digest(), dtype="<u4")
     rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(words.tolist())))
-    return material.recipe(material.pixels, material.tile, rng=rng)
+    return material.draw(material.pixels, rng=rng)
 
 
 @functools.cache
@@ -61,7 +60,7 @@ def finish(key: str, cache: Path) -> Finish:
         metallic=material.metallic,
         specular=material.specular,
         tile=material.tile,
-        detail=detail_of(material),
+        detail=material.detail,
     )
 
 
@@ -82,9 +81,9 @@ def fingerprint(key: str) -> str:
     of which the recipe is a line.
     """
     material = _material(key)
-    modules = {maps.__name__, *(PAINTERS[name].__module__ for name in painters_of(material.told))}
+    modules = {maps.__name__, *(PAINTERS[name].__module__ for name in painters_of(material.maps))}
     code = code_digest(*sorted(modules), without=(__name__, "embodied.assets.data"))
-    return digest(key, material.pixels, material.tile, dict(material.told), code)
+    return digest(key, material.pixels, material.tile, dict(material.maps), code)
 
 
 def _read_mean(folder: Path) -> dict | None:

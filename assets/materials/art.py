@@ -104,7 +104,7 @@ def hills(on: Canvas, sky: Colors, far: Color, near: Color, layers: int = 6, sun
     """Ridges behind ridges in haze under a graded sky."""
     n, rng = on.n, on.rng
     y, x = on.shares()
-    image = mix(on.rgb(sky[0]), rgb(sky[1]), smooth_step(y, 0.65))
+    image = mix(on.rgb(sky[0]), rgb(sky[1]), smooth_step(y, 0.0, 0.65))
     image *= (1 + 0.03 * on.fbm(1.5, 30, 1.5, 4.0) * (1 - y))[..., None]
     if sun:
         d = np.hypot(x - rng.uniform(0.25, 0.75), (y - rng.uniform(0.28, 0.42)))
@@ -192,7 +192,7 @@ def brushwork(on: Canvas, ground: Color, colors: Colors) -> Maps:
         v = -(x - at[0]) * np.sin(angle) + (y - at[1]) * np.cos(angle) + 0.25 * u * u
         bristles = np.interp(v, np.linspace(-wide, wide, 60), rng.normal(0, 1, 60)).astype(np.float32)
         ragged = 0.25 * long * bristles * 0.35
-        inside = smooth_step(wide - np.abs(v), 0.008) * smooth_step(long - np.abs(u) + ragged, 0.05)
+        inside = smooth_step(wide - np.abs(v), 0.0, 0.008) * smooth_step(long - np.abs(u) + ragged, 0.0, 0.05)
         c = rgb(colors[rng.integers(len(colors))]) * (1 + 0.09 * bristles)[..., None]
         image = mix(image, c, inside * 0.92)
     return maps_of(image, 0.55)

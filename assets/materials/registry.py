@@ -5,33 +5,120 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from embodied.assets import rows
+from embodied.assets.json_file import RecordError, from_plain
 from embodied.assets.materials import art, maps, mineral, surface, textile, wood
 from embodied.assets.materials.maps import Canvas, Maps
-from embodied.assets.materials.material import ROLES, Material
-from embodied.assets.rows import CatalogueError, Field, Row
+from embodied.assets.rows import Row
 
 PAINTERS = rows.made_in(art, maps, mineral, surface, textile, wood)
 """Painters that a row may name with "by", as '<module>.<name>': recipes, and layouts, motifs and cloths for them."""
-MATERIAL_FIELDS = {
-    "family": rows.WORD,
-    "name": rows.WORD,
-    "roles": Field(
-        f"a list of roles out of {', '.join(ROLES)}", lambda v: rows.is_list(v, lambda r: r in ROLES) and bool(v)
-    ),
-    "colours": rows.WORD_LIST,
-    "materials": rows.WORD_LIST,
-    "tile": Field("a length from 0.01 to 10 metres", lambda v: rows.is_number(v, 0.01, 10.0)),
-    "pixels": Field("a whole number from 64 to 4096", lambda v: isinstance(v, int) and 64 <= v <= 4096),
-    "specular": Field("a number from 0 to 1", lambda v: rows.is_number(v, 0.0, 1.0)),
-    "metallic": Field("a number from 0 to 1", lambda v: rows.is_number(v, 0.0, 1.0)),
-    "maps": Field('an object with "by" and what that is told', lambda v: isinstance(v, dict)),
+ROLES = (
+    "floor_wood",
+    "floor_tile",
+    "carpet",
+    "wall_paint",
+    "accent_paint",
+    "wallpaper",
+    "wall_tile",
+    "ceiling",
+    "brick",
+    "stone",
+    "concrete",
+    "fabric",
+    "upholstery",
+    "curtain",
+    "leather",
+    "wood",
+    "door",
+    "metal",
+    "worktop",
+    "cabinet",
+    "facade",
+    "outdoor_floor",
+    "wicker",
+    "plaster",
+    "rug",
+    "art",
+    "rug_pattern",
+    "label",
+    "outdoor",
+)
+"""Uses of a material."""
+
+
+DETAIL_OF_FAMILY = {
+    "fabric": "weave",
+    "wallpaper": "stipple",
+    "carpet": "nap",
+    "rug": "nap",
+    "wood": "pores",
+    "leather": "pebbles",
+    "plaster": "plaster",
+    "concrete": "plaster",
+    "brick": "plaster",
+    "paint": "stipple",
 }
+"""Detail of the materials of a family; others are smooth."""
+
+
+DETAIL_OF_PAINTER = {"textile.felt": "nap", "textile.Pile": "nap"}
+"""Detail of cloth without threads, whatever its family."""
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """A procedural material."""
+
+    key: str
+    """'<maker>/<variant>'."""
+    family: str
+    """Its matter: 'wood', 'tile', 'carpet', 'paint', 'wallpaper', 'stone', 'fabric', 'metal', ..."""
+    roles: tuple[str, ...]
+    """Its uses, from ROLES."""
+    name: str
+    """'oak planks', 'sage green paint'."""
+    colours: tuple[str, ...]
+    materials: tuple[str, ...]
+    tile: float
+    """Side of the square the maps cover, metres."""
+    pixels: int
+    """Side of the maps."""
+    maps: Mapping[str, Any]
+    """What draws them: {"by": painter, argument: value, ...}."""
+    specular: float = 0.5
+    metallic: float = 0.0
+
+    def __post_init__(self) -> None:
+        rules = {
+            f"'roles' should be a list of roles out of {', '.join(ROLES)}": self.roles and {*self.roles} <= {*ROLES},
+            "'tile' should be a length from 0.01 to 10 metres": 0.01 <= self.tile <= 10,
+            "'pixels' should be a whole number from 64 to 4096": 64 <= self.pixels <= 4096,
+            "'specular' and 'metallic' should be numbers from 0 to 1": min(self.specular, self.metallic) >= 0
+            and max(self.specular, self.metallic) <= 1,
+        }
+        recipe_of(self.maps)
+        if wrong := [rule for rule, holds in rules.items() if not holds]:
+            raise ValueError(wrong[0])
+
+    @functools.cached_property
+    def _painter(self) -> Callable[[Canvas], Maps]:
+        return recipe_of(self.maps)
+
+    def draw(self, n: int, *, rng: np.random.Generator) -> Maps:
+        """The maps, n pixels wide."""
+        return self._painter(Canvas(n, self.tile, rng))
+
+    @property
+    def detail(self) -> str | None:
+        """The detail that it shows from nearby, one of embodied.assets.records.DETAILS."""
+        return DETAIL_OF_PAINTER.get(self.maps["by"], DETAIL_OF_FAMILY.get(self.family))
 
 
 def read_materials(where: str, table: Row) -> Mapping[str, Material]:
@@ -41,59 +128,36 @@ def read_materials(where: str, table: Row) -> Mapping[str, Material]:
       where: name of the file, for error messages.
 
     Raises:
-      CatalogueError: a field that is unknown, missing, or holds what it should not; a key twice.
+      RecordError: a field that is unknown, missing, or holds what it should not; a key twice.
     """
     materials: dict[str, Material] = {}
     for group in table["groups"]:
         shared = {name: value for name, value in group.items() if name != "rows"}
         for key, row in group["rows"].items():
             if key in materials:
-                raise CatalogueError(f"{where}: {key!r} stands there twice; give one of them another key")
-            materials[key] = _material(f"{where}: {key!r}", key, rows.merged(shared, row, deep=("maps",)))
+                raise RecordError(f"{where}: {key!r} stands there twice; give one of them another key")
+            whole = {"key": key} | rows.merged(shared, row, deep=("maps",))
+            materials[key] = from_plain(Material, whole, f"{where}: {key!r}")
     return MappingProxyType(dict(sorted(materials.items())))
 
 
-def _material(where: str, key: str, row: Row) -> Material:
-    rows.check_row(where, row, MATERIAL_FIELDS)
-    if missing := sorted(set(MATERIAL_FIELDS) - {"specular", "metallic"} - set(row)):
-        raise CatalogueError(f"{where} should also say {missing}, itself or its group")
-    return Material(
-        key=key,
-        family=row["family"],
-        roles=tuple(row["roles"]),
-        name=row["name"],
-        colours=tuple(row["colours"]),
-        materials=tuple(row["materials"]),
-        tile=float(row["tile"]),
-        pixels=row["pixels"],
-        recipe=functools.partial(_drawn, recipe_of(where, row["maps"])),
-        told=row["maps"],
-        specular=float(row.get("specular", 0.5)),
-        metallic=float(row.get("metallic", 0.0)),
-    )
-
-
-def recipe_of(where: str, described: Row) -> Callable[..., Any]:
+def recipe_of(described: Mapping[str, Any]) -> Callable[..., Any]:
     """The meaning of {"by": painter, argument: value, ...}: a function that knows these arguments, or the record of
     a class; values may be such objects themselves, lists become tuples.
 
     Raises:
-      CatalogueError: an unknown painter, an argument it does not take.
+      ValueError: an unknown painter, an argument it does not take.
     """
     arguments = dict(described)
     name = arguments.pop("by", None)
     if name not in PAINTERS:
-        raise CatalogueError(f'{where} should have a "by" out of {", ".join(sorted(PAINTERS))}, got {name!r}')
+        raise ValueError(f'its maps should have a "by" out of {", ".join(sorted(PAINTERS))}, got {name!r}')
     painter = PAINTERS[name]
     taken = [p.name for p in inspect.signature(painter).parameters.values()]
     if unknown := sorted(set(arguments) - set(taken)):
-        raise CatalogueError(f"{where}: {name} does not take {unknown}; it takes {taken}")
-    values = {argument: _value(where, value) for argument, value in arguments.items()}
+        raise ValueError(f"{name} does not take {unknown}; it takes {taken}")
+    values = {argument: _value(value) for argument, value in arguments.items()}
     return painter(**values) if isinstance(painter, type) else functools.partial(painter, **values)
-
-
-def _drawn(painter: Callable[[Canvas], Maps], n: int, tile: float, *, rng: np.random.Generator) -> Maps:
-    return painter(Canvas(n, tile, rng))
 
 
 def painters_of(recipe: object) -> set[str]:
@@ -103,10 +167,10 @@ def painters_of(recipe: object) -> set[str]:
     return set()
 
 
-def _value(where: str, value: Any) -> Any:
+def _value(value: Any) -> Any:
     if isinstance(value, dict):
-        return recipe_of(where, value)
-    return tuple(_value(where, v) for v in value) if isinstance(value, list) else value
+        return recipe_of(value)
+    return tuple(_value(v) for v in value) if isinstance(value, list) else value
 
 
 MATERIALS: Mapping[str, Material] = read_materials("materials.json", rows.read_json(rows.DATA / "materials.json"))
