@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from embodied.assets.json_file import RecordError
-from embodied.assets.materials import MATERIALS, fingerprint, finish, make_maps, of_role
+from embodied.assets.materials import MATERIALS, fingerprint, finish, make_maps
 from embodied.assets.materials.registry import PAINTERS, painters_of, read_materials
 
 PICTURES = ("art", "rug", "label")
@@ -80,25 +80,6 @@ def test_fingerprints_differ_and_unknown_keys_say_what_exists(tmp_path):
     assert len(set(prints)) == len(prints)
     with pytest.raises(ValueError, match=r"oak_planks/7.*oak_planks/0"):
         finish("oak_planks/7", tmp_path)
-    with pytest.raises(ValueError, match="unknown material role"):
-        of_role("flor")
-
-
-def test_every_role_a_house_needs_has_a_choice():
-    for role in [
-        "floor_wood",
-        "floor_tile",
-        "carpet",
-        "wall_paint",
-        "wallpaper",
-        "wall_tile",
-        "worktop",
-        "door",
-        "facade",
-    ]:
-        assert len(of_role(role)) >= 4, role
-    assert {"paint_white/0", "oak_planks/0", "oak_planks/1"} <= set(MATERIALS)
-    assert len(MATERIALS) >= 90 and len({k.split("/")[0] for k in MATERIALS}) >= 30
 
 
 # the table
@@ -107,7 +88,6 @@ def test_every_role_a_house_needs_has_a_choice():
 ROW = {
     "family": "paint",
     "name": "lime paint",
-    "roles": ["accent_paint"],
     "colours": ["green"],
     "materials": ["paint"],
     "tile": 1.0,
@@ -141,7 +121,6 @@ def test_what_a_group_shares_may_be_overridden_and_its_recipe_is_filled_up():
     ("changes", "match"),
     [
         ({"role": ["rug"]}, "unknown fields"),
-        ({"roles": ["flor"]}, "a list of roles"),
         ({"tile": 0}, "a length"),
         ({"pixels": 1.5}, "should be an integer"),
         ({"maps": {"by": "surface.print"}}, 'should have a "by" out of'),

@@ -14,23 +14,12 @@ from embodied.assets.closure import code_digest
 from embodied.assets.json_file import read_json
 from embodied.assets.materials import maps
 from embodied.assets.materials.maps import Maps
-from embodied.assets.materials.registry import MATERIALS, PAINTERS, ROLES, Material, painters_of
+from embodied.assets.materials.registry import MATERIALS, PAINTERS, Material, painters_of
 from embodied.assets.records import Finish
 
-__all__ = ["MATERIALS", "ROLES", "Maps", "Material", "finish", "make_maps", "of_role"]
+__all__ = ["MATERIALS", "Maps", "Material", "finish", "make_maps"]
 IMAGE, NOTE = "color.png", "maps.json"
 """The colours of a material on disk, and what vouches for them."""
-
-
-def of_role(role: str) -> tuple[Material, ...]:
-    """All materials of a role, sorted by key.
-
-    Raises:
-      ValueError: an unknown role.
-    """
-    if role not in ROLES:
-        raise ValueError(f"unknown material role {role!r}; use one of {ROLES}")
-    return tuple(m for m in MATERIALS.values() if role in m.roles)
 
 
 def make_maps(key: str) -> Maps:

@@ -15,61 +15,11 @@ from embodied.assets import rows
 from embodied.assets.json_file import RecordError, from_plain
 from embodied.assets.materials import art, maps, mineral, surface, textile, wood
 from embodied.assets.materials.maps import Canvas, Maps
+from embodied.assets.records import DETAILS
 from embodied.assets.rows import Row
 
 PAINTERS = rows.made_in(art, maps, mineral, surface, textile, wood)
 """Painters that a row may name with "by", as '<module>.<name>': recipes, and layouts, motifs and cloths for them."""
-ROLES = (
-    "floor_wood",
-    "floor_tile",
-    "carpet",
-    "wall_paint",
-    "accent_paint",
-    "wallpaper",
-    "wall_tile",
-    "ceiling",
-    "brick",
-    "stone",
-    "concrete",
-    "fabric",
-    "upholstery",
-    "curtain",
-    "leather",
-    "wood",
-    "door",
-    "metal",
-    "worktop",
-    "cabinet",
-    "facade",
-    "outdoor_floor",
-    "wicker",
-    "plaster",
-    "rug",
-    "art",
-    "rug_pattern",
-    "label",
-    "outdoor",
-)
-"""Uses of a material."""
-
-
-DETAIL_OF_FAMILY = {
-    "fabric": "weave",
-    "wallpaper": "stipple",
-    "carpet": "nap",
-    "rug": "nap",
-    "wood": "pores",
-    "leather": "pebbles",
-    "plaster": "plaster",
-    "concrete": "plaster",
-    "brick": "plaster",
-    "paint": "stipple",
-}
-"""Detail of the materials of a family; others are smooth."""
-
-
-DETAIL_OF_PAINTER = {"textile.felt": "nap", "textile.Pile": "nap"}
-"""Detail of cloth without threads, whatever its family."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +30,6 @@ class Material:
     """'<maker>/<variant>'."""
     family: str
     """Its matter: 'wood', 'tile', 'carpet', 'paint', 'wallpaper', 'stone', 'fabric', 'metal', ..."""
-    roles: tuple[str, ...]
-    """Its uses, from ROLES."""
     name: str
     """'oak planks', 'sage green paint'."""
     colours: tuple[str, ...]
@@ -94,12 +42,14 @@ class Material:
     """What draws them: {"by": painter, argument: value, ...}."""
     specular: float = 0.5
     metallic: float = 0.0
+    detail: str | None = None
+    """The detail that it shows from nearby, one of embodied.assets.records.DETAILS; None for what is smooth."""
 
     def __post_init__(self) -> None:
         rules = {
-            f"'roles' should be a list of roles out of {', '.join(ROLES)}": self.roles and {*self.roles} <= {*ROLES},
             "'tile' should be a length from 0.01 to 10 metres": 0.01 <= self.tile <= 10,
             "'pixels' should be a whole number from 64 to 4096": 64 <= self.pixels <= 4096,
+            f"'detail' should be one of {DETAILS}": self.detail in (None, *DETAILS),
             "'specular' and 'metallic' should be numbers from 0 to 1": min(self.specular, self.metallic) >= 0
             and max(self.specular, self.metallic) <= 1,
         }
@@ -114,11 +64,6 @@ class Material:
     def draw(self, n: int, *, rng: np.random.Generator) -> Maps:
         """The maps, n pixels wide."""
         return self._painter(Canvas(n, self.tile, rng))
-
-    @property
-    def detail(self) -> str | None:
-        """The detail that it shows from nearby, one of embodied.assets.records.DETAILS."""
-        return DETAIL_OF_PAINTER.get(self.maps["by"], DETAIL_OF_FAMILY.get(self.family))
 
 
 def read_materials(where: str, table: Row) -> Mapping[str, Material]:
