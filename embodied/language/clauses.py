@@ -123,6 +123,6 @@ def side_of(clause: Clause) -> str | None:
 @dataclass(frozen=True)
 class RouteInstruction:
     """A route instruction as meaning: `grammar.say` puts it into words, `grammar.parse` reads it back,
-    `listener.cost` tells how badly a walk carries it out."""
+    `listener.carry_out` walks it."""
 
     clauses: tuple[Clause, ...]

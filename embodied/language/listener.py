@@ -231,25 +231,3 @@ def stop_cost(clause: Clause, seen: Surroundings) -> float:
 
 def _way(seen: Surroundings, node: int) -> Way:
     return next(w for w in seen.ways if w.node == node)
-
-
-def cost(world: SeenPlace, instruction: RouteInstruction, path: Sequence[int], yaw: float) -> float:
-    """How badly a finished walk carries out an instruction; 0 is perfect, above about 4 something was not done.
-
-    The clauses are laid along the walk in the cheapest way, with the same costs that a listener uses.
-    """
-    clauses, eyes = runnable(instruction.clauses), _Led(world, path)
-    return carry_out(eyes, RouteInstruction(clauses), path[0], yaw).cost if len(path) > 1 else 0.0
-
-
-class _Led(Lookout):
-    """Lookout of somebody who is led along a path: the only way on is the path's own."""
-
-    def __init__(self, world: SeenPlace, path: Sequence[int]) -> None:
-        super().__init__(world)
-        self._next = dict(itertools.pairwise(path))
-
-    def at(self, node: int) -> Surroundings:
-        seen = super().at(node)
-        onward = self._next.get(node)
-        return dataclasses.replace(seen, ways=tuple(w for w in seen.ways if w.node == onward))
