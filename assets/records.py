@@ -148,8 +148,6 @@ class Asset:
     """Functional tags the generator asks for: 'double', 'single', 'round', 'floor_lamp', ..."""
     emits: tuple[float, float, float] | None = None
     """Linear relative radiance of its lamp when on; None for things that give no light."""
-    lamp: tuple[float, float, float] | None = None
-    """Middle of that light, in the asset frame, metres."""
     pack: str = ""
     creator: str = ""
     licence: str = ""

@@ -162,7 +162,7 @@ def merged(*rows: Mapping[str, Any], deep: Collection[str] = ()) -> Row:
 
 
 def variant(where: str, row: Row, rows: Mapping[str, Row]) -> Row:
-    """`row` filled up from the model it is a variant of; surfaces and lamp follow its size."""
+    """`row` filled up from the model it is a variant of; its surfaces follow its size."""
     said = rows.get(str(row["of"]), {"of": ""})
     if "of" in said:
         raise RecordError(f"{where} should be a variant `of` a model in the same file, got {shown(row['of'])}")
@@ -177,6 +177,4 @@ def variant(where: str, row: Row, rows: Mapping[str, Row]) -> Row:
         ]
         for s in base.surfaces
     ]
-    if base.lamp:
-        out["lamp"] = row.get("lamp") or [v * f for v, f in zip(base.lamp, (x, y, z))]
     return out

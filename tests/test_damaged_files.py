@@ -242,7 +242,7 @@ def own_folder(folder: Path) -> Path:
     """A user's models of every format, and as much said about them as can be."""
     thing = {"class": "mug", "size": [0.1, 0.1, 0.1]}
     gnome = {"file": "g.glb", "class": "gnome", "size": [0.1, 0.1, 0.2], "looks": {"m": "wood #ff0000"}, "yaw": 90}
-    gnome |= {"surfaces": [["top", 0.2, -0.05, -0.05, 0.05, 0.05, 9]], "emits": [1, 1, 1], "lamp": [0, 0, 0.1]}
+    gnome |= {"surfaces": [["top", 0.2, -0.05, -0.05, 0.05, 0.05, 9]], "emits": [1, 1, 1]}
     models = {"box": {"file": "a.obj", **thing}, "g": gnome, "v": {"of": "g", "size": [0.2, 0.1, 0.2]}}
     models["s"] = {"file": "s.sh3f", "model": "mine/box", "class": "gnome"}
     classes = {"gnome": {"support": "floor", "rooms": {"hall": 1}, "tags": ["garden"]}}

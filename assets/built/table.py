@@ -40,7 +40,7 @@ SURFACES: Mapping[str, Callable[..., tuple[SupportSurface, ...]]] = MappingProxy
     {"shelves": storage.shelf_surfaces, "top": storage.top_surface}
 )
 """Support surfaces that follow from size and look."""
-BUILT_FIELDS = {"class", "build", "after", "set", "look"} | (rows.ASSET_FIELDS - {"lamp", "creator", "licence"})
+BUILT_FIELDS = {"class", "build", "after", "set", "look"} | (rows.ASSET_FIELDS - {"creator", "licence"})
 
 
 def read_built_assets(where: str, table: Row) -> Mapping[str, ParametricAsset]:
