@@ -194,11 +194,10 @@ def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tu
                 xb = (gx0 + gx1) / 2
                 boards.append(box([xb - 0.011, ym - 0.0125, gz0], [xb + 0.011, ym + 0.0125, gz1], 0.003))
         if i % 2 == 0:
-            xh = x1 - sash / 2
-            zh = min(max(1.05, z0 + 0.25), (z0 + z1) / 2 + 0.25) if french else (z0 + z1) / 2
-            plate = box([-0.014, 0, -0.035], [0.014, 0.01, 0.035], 0.004)
-            grip = tube([(0, 0.008, 0), (0, 0.035, 0), (0, 0.042, -0.012), (0, 0.042, -0.11)], 0.008, 8)
-            handles.append(joined(plate, grip).moved(xh, y1 + 0.012, zh))
+            x, y = x1 - sash / 2, y1 + 0.012
+            z = min(max(1.05, z0 + 0.25), (z0 + z1) / 2 + 0.25) if french else (z0 + z1) / 2
+            way = [(x, y + 0.008, z), (x, y + 0.035, z), (x, y + 0.042, z - 0.012), (x, y + 0.042, z - 0.11)]
+            handles += [box([x - 0.014, y, z - 0.035], [x + 0.014, y + 0.01, z + 0.035], 0.004), tube(way, 0.008, 8)]
     return joined(*boards), joined(*panes), handles
 
 
