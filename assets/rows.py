@@ -10,7 +10,7 @@ from typing import Any
 
 from embodied.assets import json_file
 from embodied.assets.json_file import RECORD_RULES, RecordError, from_plain, shown
-from embodied.assets.records import ROOM_KINDS, SUPPORTS, Asset, ImportRecipe, Size, SupportSurface
+from embodied.assets.records import ROOM_KINDS, SUPPORTS, Asset, ImportRecipe, SupportSurface
 
 Row = dict[str, Any]
 """One JSON object of a table."""
@@ -109,18 +109,18 @@ def read_models(
         row = only(model, given, {"class", "of"} | ASSET_FIELDS | RECIPE_FIELDS | REMADE_FIELDS)
         if "of" in row:
             row = variant(model, row, rows)
-        if row.get("class") not in classes:
-            raise RecordError(f"{model} has the unknown class {row.get('class')!r}; use one of data/classes.json")
-        shared = classes[row["class"]]
-        tags = list(dict.fromkeys((*shared.get("tags", ()), *row.get("tags", ()))))
+        shared = classes.get(str(row.get("class")))
+        if shared is None:
+            raise RecordError(f"{model} has the unknown class {shown(row.get('class'))}; use one of data/classes.json")
         licence = REMADE_LICENCE if "build" in row else licences.get(key.split("/")[0], "")
-        asset = assets[key] = asset_of(model, key, {"licence": licence} | shared | row | {"tags": tags})
+        asset = asset_of(model, key, {"licence": licence} | shared | row)
+        tags = dict.fromkeys((*shared.get("tags", ()), *asset.tags))
+        assets[key] = dataclasses.replace(asset, tags=tuple(tags))
         if "build" not in row:
-            told = {name: value for name, value in row.items() if name in RECIPE_FIELDS}
-            looks = from_plain(Mapping[str, str], told.pop("looks", {}), f"{model}: 'looks'")
-            recipe = from_plain(
-                ImportRecipe, {"key": key, "size": list(asset.size), "model": row.get("of", "")} | told, model
-            )
+            fields = {name: value for name, value in row.items() if name in RECIPE_FIELDS}
+            looks = from_plain(dict[str, str], fields.pop("looks", {}), f"{model}: 'looks'")
+            fields |= {"key": key, "size": list(asset.size), "model": row.get("of", "")}
+            recipe = from_plain(ImportRecipe, fields, model)
             recipes[key] = dataclasses.replace(recipe, emits=asset.emits, looks=tuple(sorted(looks.items())))
     return assets, recipes
 
@@ -131,12 +131,12 @@ def asset_of(where: str, key: str, row: Mapping[str, Any]) -> Asset:
     Raises:
       RecordError: says which field is wrong, and what it should hold.
     """
-    said = {name: value for name, value in row.items() if name in ASSET_FIELDS}
+    fields = {name: value for name, value in row.items() if name in ASSET_FIELDS}
     names = [f.name for f in dataclasses.fields(SupportSurface)]
     if isinstance(surfaces := row.get("surfaces"), list):
-        said["surfaces"] = [dict(zip(names, s)) if isinstance(s, list) else s for s in surfaces]
+        fields["surfaces"] = [dict(zip(names, s)) if isinstance(s, list) else s for s in surfaces]
     usual = {"key": key, "pack": key.split("/")[0], "object_class": row["class"], "name": row["class"]}
-    return from_plain(Asset, usual | said, where)
+    return from_plain(Asset, usual | fields, where)
 
 
 def made_in(*modules: ModuleType) -> Mapping[str, Any]:
@@ -163,12 +163,13 @@ def merged(*rows: Mapping[str, Any], deep: Collection[str] = ()) -> Row:
 
 def variant(where: str, row: Row, rows: Mapping[str, Row]) -> Row:
     """`row` filled up from the model it is a variant of; its surfaces follow its size."""
-    said = rows.get(str(row["of"]), {"of": ""})
-    if "of" in said:
+    base_row = rows.get(str(row["of"]), {"of": ""})
+    if "of" in base_row:
         raise RecordError(f"{where} should be a variant `of` a model in the same file, got {shown(row['of'])}")
-    base = asset_of(where, row["of"], {"class": "", "support": "floor"} | said)
-    out = merged(said, row, deep=("look", "looks"))
-    x, y, z = (n / o for n, o in zip(from_plain(Size, out["size"], f"{where}: 'size'"), base.size))
+    base = asset_of(where, row["of"], {"class": "thing", "support": "floor"} | base_row)
+    out = merged(base_row, row, deep=("look", "looks"))
+    size = from_plain(tuple[float, float, float], out["size"], f"{where}: 'size'")
+    x, y, z = (n / o for n, o in zip(size, base.size))
     out["surfaces"] = row.get("surfaces") or [
         [
             s.name,

@@ -113,5 +113,5 @@ def _parametric_asset(where: str, key: str, row: Row) -> ParametricAsset:
 
 def _parametric(where: str, asset: Asset, row: Row) -> ParametricAsset:
     build = BUILDS[rows.one_of(where, "build", row["build"], BUILDS)]
-    params = from_plain(Mapping[str, str | int | float], row.get("look", {}), f"{where}: 'look'")
+    params = from_plain(dict[str, str | int | float], row.get("look", {}), f"{where}: 'look'")
     return ParametricAsset(asset, functools.partial(built_parts, asset.key, build, params), {"seed": 0.0, **params})

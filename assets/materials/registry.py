@@ -39,7 +39,7 @@ class Material:
     pixels: int
     """Side of the maps."""
     maps: Mapping[str, Any]
-    """What draws them: {"by": painter, argument: value, ...}."""
+    """Description of what draws them: {"by": painter, argument: value, ...}."""
     specular: float = 0.5
     metallic: float = 0.0
     detail: str | None = None

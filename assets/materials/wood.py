@@ -96,7 +96,7 @@ class _Grain:
     """How the wood of every board runs; arrays (n, n) but for `plain`."""
 
     at: Places
-    """Where noise is looked up, along the boards and across."""
+    """Places at which noise is looked up, along the boards and across."""
     dark: np.ndarray
     """Summer wood, 0 to 1."""
     fine: np.ndarray
