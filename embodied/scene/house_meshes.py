@@ -24,7 +24,12 @@ class Meshes(typing.Protocol):
 
 def house_parts(house: House, catalogue: Meshes) -> tuple[Part, ...]:
     """Everything visible in and around the house: shell first, then placements, in the house's order."""
-    parts = [*shell_parts(house, catalogue.finish)]
+    return shell_parts(house, catalogue.finish) + object_parts(house, catalogue)
+
+
+def object_parts(house: House, catalogue: Meshes) -> tuple[Part, ...]:
+    """The placements alone."""
+    parts = []
     for p in house.placements:
         stem = "/".join([p.asset, *(f"{s:.4f}" for s in p.size), *(f"{k}={v}" for k, v in p.params)])
         for i, mesh in enumerate(catalogue.mesh(p.asset, p.size, p.params)):
