@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 
 import av
@@ -14,7 +13,7 @@ from hand_worlds import grid_world, line_world
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna, AssistantError
-from embodied.assistants.route_system import ancestors, build_routes, sampled_paths, spanning_parents, spanning_paths
+from embodied.assistants.route_system import build_routes, sampled_paths
 from embodied.envs.base import ActionError
 from embodied.evaluation.rollout import play
 from embodied.interface import VIEWS, Ask, Intention, Mode, Move, Pose, Route, Step, Stop, Thought, Viewpoint, viewpoint
@@ -164,32 +163,6 @@ def test_training_houses_hold_out_one_wording_of_every_path():
         by_path.setdefault(r.path, []).append(r.split)
     assert all(sorted(s) == ["train_seen", "train_seen", "train_unseen"] for s in by_path.values())
     assert len(by_path) == round(211 / 125 * 64 / 3)
-
-
-def legs_between(graph, start: int, goal: int) -> list[tuple[int, int]]:
-    """Lemma 2: up to the common ancestor and down again, in steps of 2^i edges."""
-    parent = spanning_parents(graph)[0]
-    up, down = ancestors(parent, start), ancestors(parent, goal)
-    common = next(v for v in up if v in down)
-    return [*jumps(up[: up.index(common) + 1]), *((b, a) for a, b in jumps(down[: down.index(common) + 1])[::-1])]
-
-
-def jumps(line: list[int]) -> list[tuple[int, int]]:
-    if len(line) < 2:
-        return []
-    step = 2 ** int(math.log2(len(line) - 1))
-    return [(line[0], line[step]), *jumps(line[step:])]
-
-
-@pytest.mark.parametrize("side", [4, 8])
-def test_lemma_2_guides_between_all_pairs_with_few_instructions(side):
-    graph, n = grid_world(side).graph, side * side
-    known = {(p[0], p[-1]) for p in spanning_paths(graph)}
-    assert len(known) <= 2 * n * math.log2(n) and {a for a, _ in known} == set(range(n))
-    for a, b in itertools.permutations(range(n), 2):
-        legs = legs_between(graph, a, b)
-        assert known.issuperset(legs) and len(legs) <= 2 * (math.log2(n) + 1)
-        assert [a, *(end for _, end in legs)] == [*(begin for begin, _ in legs), b]
 
 
 # The retrospective teacher

@@ -54,39 +54,6 @@ def sampled_paths(
     return [tuple(int(v) for v in graph.path(int(pairs[i, 0]), int(pairs[i, 1]))) for i in chosen]
 
 
-def spanning_parents(graph: NavGraph) -> tuple[np.ndarray, np.ndarray]:
-    """A shortest-path tree from the most central node: (n,) parent (the root its own) and (n,) depth in edges."""
-    distance = np.asarray(graph.distance)
-    root = int(np.argmin(distance.max(axis=1)))
-    parent = np.asarray(graph.next_hop)[:, root].astype(np.int64).copy()
-    parent[root] = root
-    return parent, graph.hops[:, root]
-
-
-def ancestors(parent: np.ndarray, node: int) -> list[int]:
-    """`node` and its ancestors up to the root."""
-    line = [node]
-    while parent[line[-1]] != line[-1]:
-        line.append(int(parent[line[-1]]))
-    return line
-
-
-def spanning_paths(graph: NavGraph) -> list[tuple[int, ...]]:
-    """The O(N log N) paths of Lemma 2: from each node to its 2^i-th ancestors, and back.
-
-    i runs to floor(log2 d(v)). The proof's "- 1" would leave nodes one step below the root (and
-    every 2^k-th ancestor that is the root) without any instruction, so it is read as a slip.
-    """
-    parent, depth = spanning_parents(graph)
-    paths = []
-    for v in range(len(parent)):
-        line = ancestors(parent, v)
-        for i in range(int(math.log2(depth[v])) + 1 if depth[v] else 0):
-            up = tuple(line[: 2**i + 1])
-            paths += [up, up[::-1]]
-    return paths
-
-
 def route_paths(
     graph: NavGraph, name: str, *, seed: int, house_split: str, starts: Collection[int] | None = None
 ) -> list[tuple[int, ...]]:

@@ -45,8 +45,6 @@ class DatasetOptions(Furnished, Printed):
     """Random seed; the same seed gives the same data set."""
     area: Annotated[tuple[float, float], Option(metavar=("LOW", "HIGH"))] = (150.0, 420.0)
     """Size of the houses in square metres."""
-    routes: Annotated[str, Option(words=("sampled", "spanning"))] = "sampled"
-    """Routes that assistants know: random ones, or those of a spanning tree."""
     language: Annotated[str, Option(words=("people", "plain"))] = "people"
     """Wording of the routes: varied, with habits and landmarks (people), or plain turns and rooms (plain)."""
     no_rooms: bool = False
@@ -112,9 +110,8 @@ def run(args: DatasetOptions) -> None:
         chosen_scale(args),
         args.seed,
         args.area,
-        args.routes,
-        not args.no_people,
-        args.language,
+        people=not args.no_people,
+        language=args.language,
         rooms=not args.no_rooms,
         ood=args.ood,
     )

@@ -124,16 +124,14 @@ def show_a_room(args: DemoOptions) -> None:
 
 def inhabited(house: House, catalogue: Catalogue, args: DemoOptions) -> tuple[House, NavGraph, tuple[Route, ...]]:
     """The house with people at the starts of the routes they know, its graph, and the routes in their words."""
-    from embodied.assistants.route_system import WORDINGS, route_paths, worded
-    from embodied.generate.people import add_people, place_people
+    from embodied.assistants.route_system import WORDINGS, worded
+    from embodied.datasets.build import with_people
     from embodied.language import People
     from embodied.navigation.graph import build_graph
     from embodied.world import open_world
 
     graph = build_graph(house)
-    met = place_people(house, graph, catalogue, seed=args.seed)
-    paths = route_paths(graph, house.name, seed=args.seed, house_split="test", starts=met)
-    house = add_people(house, met, (p[0] for p in paths))
+    house, paths = with_people(house, graph, catalogue, args.seed, "test")
     with open_world(house, catalogue, args.cache, graph=graph) as world:
         return house, graph, worded(world, paths, WORDINGS["test"], seed=args.seed, language=People())
 

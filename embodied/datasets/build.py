@@ -17,7 +17,7 @@ from joblib.externals.loky import process_executor
 from embodied.assets.cache import digest, drafts, sweep, write_bytes, write_json
 from embodied.assets.catalogue import GROUPS, Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
-from embodied.assistants.route_system import WORDINGS, route_paths, spanning_paths, worded
+from embodied.assistants.route_system import WORDINGS, route_paths, worded
 from embodied.datasets.scale import Scale, quota, scale
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.furnish.tables import tables_of
@@ -69,7 +69,7 @@ class DatasetConfig:
     area: tuple[float, float] = (150.0, 420.0)
     """Smallest and largest house, square metres."""
     routes: str = "sampled"
-    """'sampled' as in Room-to-Room, or 'spanning' as in Lemma 2."""
+    """'sampled', as in Room-to-Room."""
     people: bool = True
     """Assistants stand in the house as figures (HANNA)."""
     language: str = "people"
@@ -83,8 +83,8 @@ class DatasetConfig:
     """Digest of the user's own groups.toml files that the houses are furnished by, too; `build_dataset` fills it in."""
 
     def __post_init__(self) -> None:
-        if self.routes not in ("sampled", "spanning"):
-            raise ValueError(f"routes should be 'sampled' or 'spanning', got {self.routes!r}")
+        if self.routes != "sampled":
+            raise ValueError(f"routes should be 'sampled', got {self.routes!r}")
         if self.language not in VOICES:
             raise ValueError(f"language should be one of {sorted(VOICES)}, got {self.language!r}")
         if isinstance(self.scale, str) and self.scale not in DATASET_SCALES:  # as files have it
@@ -322,6 +322,15 @@ def make_dataset_house(seed: int, name: str, config: HouseConfig, catalogue: Cat
     raise HouseError(f"no house for {name!r} after {SEEDS} seeds; the last said {problems[-1]}")
 
 
+def with_people(
+    house: House, graph: NavGraph, figures: Catalogue, seed: int, house_split: str
+) -> tuple[House, list[tuple[int, ...]]]:
+    """A house with people at the starts of the routes that they know, and the paths of these routes."""
+    met = place_people(house, graph, figures, seed=seed)
+    paths = route_paths(graph, house.name, seed=seed, house_split=house_split, starts=met)
+    return add_people(house, met, (p[0] for p in paths)), paths
+
+
 def _write_unit(
     unit: Unit, config: DatasetConfig, home: Path, catalogue: Catalogue, cache: Path, make_house: HouseMaker
 ) -> None:
@@ -329,19 +338,14 @@ def _write_unit(
     language = VOICES[config.language](novelty)
     house, graph = make_house(config.seed, unit.name, HouseConfig(area=config.area, novelty=novelty), catalogue)
     house_split = {"extra": "train", "ood": "test"}.get(unit.group, unit.group)
-    wording = WORDINGS[house_split]
     paths: list[tuple[int, ...]] = []
     kind = config.task_kind
-    if kind.routes:
-        figures = furnishable(catalogue, novelty)
-        met = place_people(house, graph, figures, seed=config.seed) if kind.people and config.people else None
-        if config.routes == "spanning":
-            paths, wording = spanning_paths(graph), tuple(dict.fromkeys(wording))
-        else:
-            paths = route_paths(graph, unit.name, seed=config.seed, house_split=house_split, starts=met)
-        house = house if met is None else add_people(house, met, (p[0] for p in paths))
+    if kind.people and config.people:
+        house, paths = with_people(house, graph, furnishable(catalogue, novelty), config.seed, house_split)
+    elif kind.routes:
+        paths = route_paths(graph, unit.name, seed=config.seed, house_split=house_split)
     with open_world(house, catalogue, cache, graph=graph) as world:
-        routes = worded(world, paths, wording, seed=config.seed, language=language)
+        routes = worded(world, paths, WORDINGS[house_split], seed=config.seed, language=language)
         inputs = TaskInputs(world, routes, config.seed, language, config.rooms)
         tasks = kind.tasks(inputs, [(s.part, n) for s, n in shares(unit, config)])
     house.save(home / "house.json")

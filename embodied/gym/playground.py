@@ -15,10 +15,9 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.assets.records import ROOM_KINDS
 from embodied.assistants.route_system import WORDINGS, route_paths, worded
-from embodied.datasets.build import make_dataset_house
+from embodied.datasets.build import make_dataset_house, with_people
 from embodied.datasets.store import Dataset
 from embodied.generate import HouseConfig
-from embodied.generate.people import add_people, place_people
 from embodied.gym.semantic_features import semantic_features
 from embodied.gym.sensors import checked_observations
 from embodied.interface import Assistant, Language, Route, SeenPlace, Task
@@ -142,9 +141,7 @@ def houses_playground(
         house, graph = make_dataset_house(house_seed, name, HouseConfig(area=area), catalogue)
         paths = None
         if known.people:
-            met = place_people(house, graph, catalogue, seed=house_seed)
-            paths = route_paths(graph, name, seed=house_seed, house_split="test", starts=met)
-            house = add_people(house, met, (p[0] for p in paths))
+            house, paths = with_people(house, graph, catalogue, house_seed, "test")
         world = open_world(house, catalogue, settings.cached, graph=graph, pictures=drawn)
         if drawn.quality is not None:
             world.baked(progress=True)

@@ -94,7 +94,7 @@ class SharedSyncVectorEnv(VectorObservationWrapper[dict[str, Any], Any, dict[str
         if threads is not None and threads < 1:
             raise ValueError(f"threads should be at least 1, got {threads}")
         super().__init__(slots)
-        self._slots: list[HelpGymEnv] = [env.unwrapped for env in slots.envs]
+        self._slots: list[Any] = [env.unwrapped for env in slots.envs]
         self._sensor, self._seen = sensor, gym.spaces.Dict({**sensor.spaces()})
         own_spaces = slots.single_observation_space
         assert isinstance(own_spaces, gym.spaces.Dict), "an environment shows several things"
@@ -119,7 +119,7 @@ class SharedSyncVectorEnv(VectorObservationWrapper[dict[str, Any], Any, dict[str
 
     def observations(self, observations: dict[str, Any]) -> dict[str, Any]:
         """Add what all slots see: places are opened by this thread, since only it may draw; pictures made by all."""
-        arrays: dict[str, Any] = create_empty_array(self._seen, self.num_envs, np.empty)
+        arrays: Any = create_empty_array(self._seen, self.num_envs, np.empty)
         looks = [self._sensor.look(env.observed) for env in self._slots]
 
         def fill(first: int) -> None:
