@@ -22,6 +22,8 @@ OURS = "embodied"
 ROOT = Path(str(sys.modules[OURS].__file__)).resolve().parent.parent
 BESIDE = ("agents", "assets", "viz")
 """Parts of it that lie beside its folder in a clone, and inside it where a wheel installed them."""
+BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
+"""Fields of statements that hold statements."""
 INDIFFERENT = frozenset({"tqdm", "joblib", "ray", "numba", "OpenGL", "gymnasium", "rerun", "psutil"})
 """Libraries that decide no byte of any product: they show, spread, hasten or hand on what others make."""
 
@@ -68,15 +70,19 @@ def closure(*makers: str, root: Path = ROOT, without: Collection[str] = ()) -> C
     return Closure(dict(sorted(paths.items())), tuple(sorted(libraries)))
 
 
-def imported(tree: ast.Module, module: str, *, package: bool) -> Iterator[str]:
-    """Dotted names that a module imports when it runs: modules, and what may be modules in packages."""
+def imported(tree: ast.Module, module: str, *, package: bool, called: bool) -> Iterator[str]:
+    """Dotted names that a module imports when it runs: modules, and what may be modules in packages.
+
+    Args:
+      called: calls of `import_module` are looked for, too, in all expressions; without, statements are enough.
+    """
     waiting: list[ast.AST] = list(tree.body)
     while waiting:
         node = waiting.pop()
         if isinstance(node, ast.If) and _last_name(node.test) == "TYPE_CHECKING":
             waiting += node.orelse
             continue
-        waiting += ast.iter_child_nodes(node)
+        waiting += ast.iter_child_nodes(node) if called else (n for b in BLOCKS for n in getattr(node, b, ()))
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -124,9 +130,11 @@ class _Read:
 @functools.lru_cache(maxsize=1024)
 def _read(source: bytes, module: str, package: bool) -> _Read:
     tree = ast.parse(source)
-    texts = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)]
-    tables = frozenset(text for text in texts if isinstance(text, str) and re.fullmatch(r"\w+\.toml", text))
-    return _Read(tuple(imported(tree, module, package=package)), tables, digest(repr(_described(tree))))
+    nodes = ast.walk(tree) if b".toml" in source else ()
+    texts = [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    tables = frozenset(text for text in texts if re.fullmatch(r"\w+\.toml", text))
+    names = imported(tree, module, package=package, called=b"import_module" in source)
+    return _Read(tuple(names), tables, digest(_described(tree)))
 
 
 def _last_name(node: ast.expr) -> str:
@@ -159,18 +167,17 @@ def _absolute(node: ast.ImportFrom, module: str, package: bool) -> str:
     return ".".join([*above, *([node.module] if node.module else [])])
 
 
-def _described(value: object) -> object:
-    """Syntax as tuples, without docstrings, positions and what is empty, in which versions of Python differ."""
+def _described(value: object) -> str:
+    """Syntax as text, without docstrings, positions and what is empty, in which versions of Python differ."""
+    if isinstance(value, list):
+        return f"[{', '.join([_described(part) for part in value if not _is_docstring(part)])}]"
+    if not isinstance(value, ast.AST):
+        return repr(value)
     if isinstance(value, ast.JoinedStr):
         value = ast.JoinedStr([part for part in value.values if getattr(part, "value", None) != ""])
-    if isinstance(value, ast.AST):
-        parts = [(name, getattr(value, name)) for name in value._fields if name != "ctx"]
-        return type(value).__name__, *(
-            (name, _described(part)) for name, part in parts if part is not None and part != []
-        )
-    if isinstance(value, list):
-        return tuple(_described(part) for part in value if not _is_docstring(part))
-    return value
+    parts = [(name, getattr(value, name)) for name in value._fields if name != "ctx"]
+    shown = [f"{name}={_described(part)}" for name, part in parts if part is not None and part != []]
+    return f"{type(value).__name__}({', '.join(shown)})"
 
 
 def _is_docstring(node: object) -> bool:
