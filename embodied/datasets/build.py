@@ -144,7 +144,7 @@ class UnitFacts:
     """SplitPlan to number of tasks."""
 
 
-DRAWING = ("mitsuba", "drjit", "embreex", "xatlas")
+DRAWING = ("mitsuba", "drjit", "embreex", "xatlas", "trimesh")
 """Libraries that light and draw houses, which pictures have in their own keys; houses and words do without."""
 Watch = Callable[[Iterable[str], int], Iterable[str]]
 HouseMaker = Callable[[int, str, HouseConfig, Catalogue], tuple[House, NavGraph]]
