@@ -207,7 +207,7 @@ def test_a_recording_shows_the_house_as_it_is_now(world):
     for x in (root.position[0], 1.0):
         world.move(root.id, (x, *root.position[1:]))
         recorded.log_world(stream, world)
-        recorded.log_sight(stream, recorded.views_of(world, None), Pose(0, 0.0, 0.0))
+        recorded.log_sight(stream, recorded.Views(world, recorded.PictureSizes()), Pose(0, 0.0, 0.0))
         places.append(np.mean(logged[path][-1].vertex_positions.as_arrow_array().to_pylist(), axis=0))
         pictures.append(bytes(logged["view/panorama"][-1].blob.as_arrow_array()[0].as_py()))
     world.show(Moment())

@@ -51,6 +51,8 @@ SAFE = {
     "referrer-policy": "no-referrer",
     "cross-origin-opener-policy": "same-origin",
 }
+LOGGED_STRANGERS = 50
+"""Addresses of other pages that are logged, each once."""
 log = logging.getLogger(__name__)
 
 
@@ -89,6 +91,7 @@ class Server:
         self._sockets: dict[str, WebSocket] = {}
         self._bots: dict[str, asyncio.Task[None]] = {}
         houses = houses_of(sessions)
+        self._strangers: set[str] = set()
         self._plan = functools.cache(lambda house: plan_of(houses[house], pictures))
         self.failed = False
         """Something could not be written down; nothing is acknowledged any more."""
@@ -218,7 +221,9 @@ class Server:
             return None
         text = f"This page was opened at {page}, but the study is at {' or '.join(wanted[:1]) or 'another address'}. "
         text += f"Please open the link that you were given. (The server admits {page} if it is started with --address.)"
-        log.warning("refused the page at %s: the study is at %s; see --address", page, ", ".join(wanted))
+        if page not in self._strangers and len(self._strangers) < LOGGED_STRANGERS:
+            self._strangers.add(page)
+            log.warning("refused the page at %s: the study is at %s; see --address", page, ", ".join(wanted))
         return text
 
     async def _enter(self, socket: WebSocket, hello: dict[str, Any]) -> Person:
