@@ -17,7 +17,7 @@ from embodied.house.house import HouseError, Light, Sky
 from embodied.house.moment import Moment, RigidPose
 from embodied.interface import Pose
 from embodied.light import bake
-from embodied.light.moving import filled
+from embodied.light.tiles import filled
 from embodied.light.viewer import ViewerLight
 from embodied.navigation.graph import build_graph
 from embodied.render.classic import Renderer

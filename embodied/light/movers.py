@@ -376,3 +376,30 @@ def hidden_share(thing: Placed, position: np.ndarray, normal: np.ndarray) -> np.
         ahead = _cosine_directions(around, (start + np.array(r2(k + 1.0))) % 1.0).astype(np.float32)
         met += thing.surface.first_hit(local, ahead)[0] >= 0
     return met / HIDING_RAYS
+
+
+def hidden_by(placed: Placed, start: np.ndarray, towards: np.ndarray) -> np.ndarray:
+    """(n,) bool: a thing stands between points and the sun."""
+    turn = placed.pose.rotation.astype(np.float32)
+    local, ahead = (start - np.asarray(placed.pose.position, np.float32)) @ turn, towards @ turn
+    low, high = placed.surface.box
+    with np.errstate(divide="ignore"):
+        steep = 1 / ahead
+    begin, end = (low - local) * steep, (high - local) * steep
+    first, last = np.fmin(begin, end), np.fmax(begin, end)
+    near = np.maximum(np.maximum(first[:, 0], first[:, 1]), first[:, 2])
+    far = np.minimum(np.minimum(last[:, 0], last[:, 1]), last[:, 2])
+    out: np.ndarray = (near <= far) & (far > 0)
+    which = np.flatnonzero(out)
+    if len(which) and len(placed.surface.corners):
+        along = np.broadcast_to(ahead, (len(which), 3)).astype(np.float32)
+        out[which] = placed.surface.first_hit(local[which], along)[0] >= 0
+    return out
+
+
+def shadow_box(
+    low: np.ndarray, high: np.ndarray, towards: np.ndarray, floor: float = 3.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """A box that holds the shadow of what is in a box, as far as `floor` metres below it."""
+    along = -towards * (min(high[2] - low[2] + floor, 8.0) / max(float(towards[2]), 0.15))
+    return np.minimum(low, low + along), np.maximum(high, high + along)

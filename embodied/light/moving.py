@@ -12,7 +12,6 @@ import functools
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
 
 import cv2
 import numpy as np
@@ -27,21 +26,22 @@ from embodied.light.movers import (
     Surface,
     SurfacePage,
     cloud_of,
+    hidden_by,
     hidden_share,
     hiding,
     kernels,
     shading,
+    shadow_box,
     surface_of,
     unhidden,
 )
 from embodied.light.pages.colours import linear
-from embodied.light.pages.cover import sources
-from embodied.light.pages.files import Bake, Ingredients
+from embodied.light.pages.files import Bake
 from embodied.light.pages.gloss_data import gloss_data_of
-from embodied.light.pages.tone import _shown_table as shown_table
-from embodied.light.pages.tone import displayed
+from embodied.light.pages.tone import displayed, shown_table
 from embodied.light.probes import CORNERS, harmonics, radiance, turned
 from embodied.light.settings import LightSettings
+from embodied.light.tiles import HALF_TILE, SAMPLES, TILE, Receiver, Tile, blocks_of, filled, luxels_in, read_receiver
 from embodied.light.tracing.emitters import GLAZING, portals_of, read_lamps
 from embodied.light.tracing.rays import rays_among
 from embodied.light.tracing.sky import sun_direction, sun_height, sun_strength
@@ -51,10 +51,6 @@ from embodied.scene.joinery import opening_parts
 from embodied.scene.lit_pages import ANYWHERE, LitMesh, LitPages
 from embodied.scene.part import Part
 
-TILE = 16
-"""Luxels along the sides of the tiles in which pages change."""
-HALF_TILE = TILE // 2
-SAMPLES = HALF_TILE * HALF_TILE
 FAINT = 0.025
 """Share of what a place sees, hidden by a thing, below which that is not shown."""
 SLIGHT, SLIGHT_MOVING = 0.01, 0.03
@@ -74,13 +70,8 @@ UNKNOWN_BELOW, KNOWN_FROM = 0.5, 0.92
 gone, and above which it says all."""
 BRIGHT = (0.3, 2.0)
 """Bounds of how bright what a thing hides is, beside the rest: nine harmonics are no more sure of one direction."""
-METALLIC = 77
-"""Metallic share, times 255, from which on a page wears what the face mirrors, which does not change."""
 AWAY = RigidPose((0.0, 0.0, -1e3))
 """Pose of a body that the moment does not have."""
-
-Tile: TypeAlias = tuple[int, int, int]
-"""Page, row and column of a tile."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,33 +94,6 @@ class SceneChange:
     patches: tuple[Patch, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class _Receiver:
-    """A page of the house as something that things hide light from; in luxels."""
-
-    position: np.ndarray
-    """(h, w, 3) float32, of the nearest covered luxel where none is."""
-    normal: np.ndarray
-    takes: np.ndarray
-    """(h, w) bool: its light may change."""
-    mesh: np.ndarray
-    """(h, w) int32: which of the page's meshes a luxel is of; -1 where it is of none."""
-    low: np.ndarray
-    high: np.ndarray
-    """(rows, columns, 3) boxes of its tiles; empty ones are far away."""
-    samples: np.ndarray
-    sample_normals: np.ndarray
-    """(rows, columns, SAMPLES, 3) float32 of every second luxel of its tiles, row by row."""
-    gain: np.ndarray
-    """(h, w, 3)."""
-    held: Ingredients
-    fineness: int
-
-    def near(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """(k, 2) row and column of the tiles that meet a box."""
-        return np.argwhere(((self.low <= high) & (self.high >= low)).all(-1))
-
-
 class MovingHouse:
     """Owns what has moved so far, its surfaces, and the light of the pages that changed."""
 
@@ -143,7 +107,7 @@ class MovingHouse:
         self._settings = LightSettings(**bake.manifest["settings"])
         self._things: dict[str, _Thing] = {}
         self._placed: dict[str, Placed] = {}
-        self._receivers: dict[int, _Receiver] = {}
+        self._receivers: dict[int, Receiver] = {}
         self._base: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self._touched: set[Tile] = set()
         self._shown: dict[Tile, _Shown] = {}
@@ -420,7 +384,7 @@ class MovingHouse:
             start = (position[which] + side * 4e-3).astype(np.float32)
             met = self._static(start, np.broadcast_to(self._towards, start.shape))
             for placed in (*(p for name, p in self._placed.items() if name not in without), *own):
-                met |= _hidden_by(placed, start, self._towards)
+                met |= hidden_by(placed, start, self._towards)
             which = which[~met]
         share = np.zeros(len(position), np.float32)
         share[which] = cos[which]
@@ -438,7 +402,7 @@ class MovingHouse:
                 out |= (t > 0) & (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1)
         return out
 
-    def _pages_near(self, low: np.ndarray, high: np.ndarray) -> Iterator[tuple[int, _Receiver, np.ndarray]]:
+    def _pages_near(self, low: np.ndarray, high: np.ndarray) -> Iterator[tuple[int, Receiver, np.ndarray]]:
         """Pages, and tiles of them, (k, 2), that meet a box."""
         corners = np.where(CORNERS > 0, high, low)
         rooms = {room_at(self.house, c) for c in (*corners, (low + high) / 2)}
@@ -454,52 +418,10 @@ class MovingHouse:
         own = self.bake.manifest["own_pages"]
         return {m.page: m.room for m in self.bake.lit.meshes if m.page < own and m.alpha >= 0.9 and len(m.faces)}
 
-    def _receiver(self, page: int) -> _Receiver:
+    def _receiver(self, page: int) -> Receiver:
         if page not in self._receivers:
-            self._receivers[page] = self._read_receiver(page)
+            self._receivers[page] = read_receiver(self.bake, page)
         return self._receivers[page]
-
-    def _read_receiver(self, page: int) -> _Receiver:
-        held = self.bake.ingredients(page)
-        h, w = held.soft.shape[:2]
-        whole = [(m, g) for m, g in zip(self.bake.lit.meshes, self.bake.gloss) if m.page == page and len(m.faces)]
-        corners = np.concatenate([m.vertices[m.faces] for m, _ in whole])
-        flat = np.concatenate([m.uv[m.faces] for m, _ in whole]) * np.array([w, h], np.float32)
-        dull = np.concatenate([g[:, 2] < METALLIC if g is not None else np.zeros(len(m.faces), bool) for m, g in whole])
-        layout = np.concatenate([flat, np.zeros((*flat.shape[:2], 1), np.float32)], axis=-1)
-        row, column = np.divmod(np.arange(h * w), w)
-        above = np.stack([column + 0.5, row + 0.5, np.ones(h * w)], axis=1).astype(np.float32)
-        face, _, u, v = rays_among(layout)(above, np.tile(np.array([0, 0, -1], np.float32), (h * w, 1)))
-        index = np.flatnonzero(face >= 0)
-        face, weights = face[index], np.stack([1 - u - v, u, v], axis=1)[index]
-        position = np.einsum("nk,nkc->nc", weights, corners[face])
-        sides = corners[:, 1:] - corners[:, :1]
-        normal = np.cross(sides[:, 0], sides[:, 1])
-        normal = (normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12))[face]
-        shown_by = sources(index, (h, w))
-        takes = np.zeros(h * w, bool)
-        takes[index] = dull[face]
-        if held.glow.size:
-            takes &= held.glow.reshape(-1, 3).max(1) == 0
-        mesh = np.full(h * w, -1, np.int32)
-        mesh[index] = np.repeat(np.arange(len(whole)), [len(m.faces) for m, _ in whole])[face]
-        where, gain = position[shown_by], self.bake.exposure.near(position)[shown_by]
-        low, high = _tiles_of(where.reshape(h, w, 3), takes.reshape(h, w))
-        shape = lambda a: a.reshape(h, w, 3).astype(np.float32)
-        fineness = held.albedo.shape[0] // h
-        return _Receiver(
-            shape(where),
-            shape(normal[shown_by]),
-            takes.reshape(h, w),
-            mesh.reshape(h, w),
-            low,
-            high,
-            _sampled(shape(where)),
-            _sampled(shape(normal[shown_by])),
-            shape(gain),
-            held,
-            fineness,
-        )
 
     def _light(self, page: int) -> tuple[np.ndarray, np.ndarray]:
         """(h, w, 3) float32 light in luxels, and (h, w) float32 share of the sun in texels, of a page without what
@@ -522,7 +444,7 @@ class MovingHouse:
                 soft, _ = self._light(page)
                 known = np.ones(soft.shape[:2], np.float32)
                 for tile in tiles.tolist():
-                    at = _luxels(tile)
+                    at = luxels_in(tile)
                     soft[at], known[at] = self._without(placed, receiver, soft[at], at)
                     self._touched.add((page, tile[0], tile[1]))
                 for k in np.unique(receiver.mesh[(known < 1) & (receiver.mesh >= 0)]):
@@ -536,7 +458,7 @@ class MovingHouse:
                 self._give_sun_back(name, placed)
 
     def _without(
-        self, placed: Placed, r: _Receiver, e: np.ndarray, at: tuple[slice, slice]
+        self, placed: Placed, r: Receiver, e: np.ndarray, at: tuple[slice, slice]
     ) -> tuple[np.ndarray, np.ndarray]:
         """(h, w, 3) light of a tile as it would be without a thing, and (h, w) how far that is known, 0 to 1."""
         position, normal = r.position[at].reshape(-1, 3), r.normal[at].reshape(-1, 3)
@@ -557,12 +479,12 @@ class MovingHouse:
         return np.maximum(e, 1e-5), around
 
     def _give_sun_back(self, name: str, placed: Placed) -> None:
-        low, high = _shadow_box(*placed.box, self._towards)
+        low, high = shadow_box(*placed.box, self._towards)
         for page, receiver, tiles in self._pages_near(low, high):
             sun = self._light(page)[1]
             for tile in tiles.tolist():
-                position, normal, at = self._texels(receiver, tile)
-                which = np.flatnonzero(_hidden_by(placed, position + normal * 2e-3, self._towards))
+                position, normal, at = receiver.texels(tile)
+                which = np.flatnonzero(hidden_by(placed, position + normal * 2e-3, self._towards))
                 if len(which):
                     none = np.zeros(len(which), bool)
                     share = self._sun_share(position[which], normal[which], none, (name,))
@@ -570,17 +492,6 @@ class MovingHouse:
                     part[which] = np.maximum(part[which], share)
                     sun[at] = part.reshape(sun[at].shape)
                     self._touched.add((page, tile[0], tile[1]))
-
-    def _texels(self, r: _Receiver, tile: Sequence[int]) -> tuple[np.ndarray, np.ndarray, tuple[slice, slice]]:
-        """(n, 3) positions and normals of the texels of a tile, and where on the page they are."""
-        at = _luxels(tile)
-        position = r.position[at]
-        h, w = position.shape[:2]
-        size = (w * r.fineness, h * r.fineness)
-        fine = cv2.resize(position, size, interpolation=cv2.INTER_LINEAR)
-        normal = cv2.resize(r.normal[at], size, interpolation=cv2.INTER_NEAREST)
-        rows, columns = (slice(s.start * r.fineness, s.start * r.fineness + n) for s, n in zip(at, size[::-1]))
-        return fine.reshape(-1, 3), normal.reshape(-1, 3), (rows, columns)
 
     def _house_patches(self, slack: float) -> Iterator[Patch]:
         """Tiles whose light is not what was shown last."""
@@ -619,7 +530,7 @@ class MovingHouse:
         for tile in sorted(tiles):
             by_page.setdefault(tile[0], []).append(tile)
         for page, own in by_page.items():
-            for block in _blocks(np.array(own)[:, 1:]):
+            for block in blocks_of(np.array(own)[:, 1:]):
                 yield self._patch(page, block)
 
     def _hides(self, things: Sequence[Placed]) -> _Hides:
@@ -628,7 +539,7 @@ class MovingHouse:
         near = list(self._pages_near(low - SHADOW_REACH, high + SHADOW_REACH))
         sunlit: list[Tile] = []
         if len(self._portals):
-            for page, _, tiles in self._pages_near(*_shadow_box(low, high, self._towards)):
+            for page, _, tiles in self._pages_near(*shadow_box(low, high, self._towards)):
                 sunlit += [(page, i, k) for i, k in tiles[self._sunny(page)[tuple(tiles.T)]].tolist()]
         if not near:
             return _Hides(tuple(things), {}, frozenset(sunlit))
@@ -681,8 +592,8 @@ class MovingHouse:
         for tile in low + np.array([*np.ndindex(*(high - low))]):  # also those that were changed before
             name = (page, int(tile[0]), int(tile[1]))
             if name in self._shown and (self._shown[name].things or name in self._touched):
-                part = _luxels(tile - low)
-                changes[part] = r.takes[_luxels(tile)]
+                part = luxels_in(tile - low)
+                changes[part] = r.takes[luxels_in(tile)]
                 sunlit += [tile] if self._sunny(page)[name[1:]] else []
         for tile, left in zip(sunlit, self._sun_left(page, sunlit), strict=True):
             row, column = (tile - low) * TILE * f
@@ -719,7 +630,7 @@ class MovingHouse:
         r, (_, sun) = self._receiver(page), self._light(page)
         shares, starts = [], []
         for tile in tiles:
-            position, normal, at = self._texels(r, tile.tolist())
+            position, normal, at = r.texels(tile.tolist())
             shares.append(sun[at].copy())
             lit = np.flatnonzero(shares[-1])
             starts.append(position[lit] + normal[lit] * 2e-3)
@@ -729,7 +640,7 @@ class MovingHouse:
         things = {id(p): p for name in names for hides in self._shown[name].things for p in hides.things}
         start, left = np.concatenate(starts), np.concatenate([s.ravel()[np.flatnonzero(s)] for s in shares])
         for placed in things.values():
-            left[_hidden_by(placed, start, self._towards)] = 0
+            left[hidden_by(placed, start, self._towards)] = 0
         for share, part in zip(shares, np.split(left, np.cumsum([len(s) for s in starts])[:-1]), strict=True):
             share.ravel()[np.flatnonzero(share)] = part
         return shares
@@ -836,87 +747,5 @@ def _tint(s: Surface, m: LitMesh, gloss: np.ndarray) -> np.ndarray | None:
     return tint
 
 
-def _hidden_by(placed: Placed, start: np.ndarray, towards: np.ndarray) -> np.ndarray:
-    """(n,) bool: a thing stands between points and the sun."""
-    turn = placed.pose.rotation.astype(np.float32)
-    local, ahead = (start - np.asarray(placed.pose.position, np.float32)) @ turn, towards @ turn
-    low, high = placed.surface.box
-    with np.errstate(divide="ignore"):
-        steep = 1 / ahead
-    begin, end = (low - local) * steep, (high - local) * steep
-    first, last = np.fmin(begin, end), np.fmax(begin, end)
-    near = np.maximum(np.maximum(first[:, 0], first[:, 1]), first[:, 2])
-    far = np.minimum(np.minimum(last[:, 0], last[:, 1]), last[:, 2])
-    out: np.ndarray = (near <= far) & (far > 0)
-    which = np.flatnonzero(out)
-    if len(which) and len(placed.surface.corners):
-        along = np.broadcast_to(ahead, (len(which), 3)).astype(np.float32)
-        out[which] = placed.surface.first_hit(local[which], along)[0] >= 0
-    return out
-
-
-def _sampled(a: np.ndarray) -> np.ndarray:
-    """(rows, columns, SAMPLES, 3) means of two by two luxels of a page (h, w, 3), tile by tile."""
-    h, w = a.shape[:2]
-    rows, columns = -(-h // TILE), -(-w // TILE)
-    whole = cv2.copyMakeBorder(a, 0, rows * TILE - h, 0, columns * TILE - w, cv2.BORDER_REPLICATE)
-    small = cv2.resize(whole, (columns * HALF_TILE, rows * HALF_TILE), interpolation=cv2.INTER_AREA)
-    return small.reshape(rows, HALF_TILE, columns, HALF_TILE, 3).swapaxes(1, 2).reshape(rows, columns, SAMPLES, 3)
-
-
-def filled(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """(h, w, 3) float32 of the pixels that weigh something, spread over those that do not.
-
-    Source: push and pull: S. Gortler and others, The lumigraph (1996), section 3.4.
-    """
-    both = np.dstack([picture * weight[..., None], weight]).astype(np.float32)
-    levels = [both]
-    while min(levels[-1].shape[:2]) > 1:
-        h, w = ((n + 1) // 2 for n in levels[-1].shape[:2])
-        small = cv2.resize(levels[-1], (w, h), interpolation=cv2.INTER_AREA)
-        weighs = small[..., 3:].copy()
-        levels.append(small * (np.minimum(weighs * 4, 1) / np.maximum(weighs, 1e-6)))
-    out = levels[-1]
-    for level in levels[-2::-1]:
-        larger = cv2.resize(out, level.shape[1::-1], interpolation=cv2.INTER_LINEAR)
-        larger /= np.maximum(larger[..., 3:], 1e-6)
-        out = level + (1 - np.minimum(level[..., 3:], 1)) * larger
-    return out[..., :3]
-
-
-def _blocks(tiles: np.ndarray) -> list[np.ndarray]:
-    """Tiles (k, 2) in sets whose rectangles they fill at least by half."""
-    low, high = tiles.min(0), tiles.max(0) + 1
-    if 2 * len(tiles) >= (high - low).prod():
-        return [tiles]
-    axis = int(np.argmax(high - low))
-    order = tiles[np.argsort(tiles[:, axis], kind="stable")]
-    gaps = np.diff(order[:, axis])
-    cut = int(np.argmax(gaps)) + 1 if gaps.max() > 1 else int(np.searchsorted(order[:, axis], (low + high)[axis] / 2))
-    return [*_blocks(order[:cut]), *_blocks(order[cut:])]
-
-
 def _nothing(m: LitMesh) -> LitMesh:
     return dataclasses.replace(m, faces=m.faces[:0])
-
-
-def _luxels(tile: Sequence[int]) -> tuple[slice, slice]:
-    return slice(tile[0] * TILE, (tile[0] + 1) * TILE), slice(tile[1] * TILE, (tile[1] + 1) * TILE)
-
-
-def _tiles_of(position: np.ndarray, takes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Boxes of the tiles of a page (h, w, 3)."""
-    h, w = takes.shape
-    rows, columns = -(-h // TILE), -(-w // TILE)
-    low, high = np.full((rows * TILE, columns * TILE, 3), 1e9), np.full((rows * TILE, columns * TILE, 3), -1e9)
-    low[:h, :w][takes], high[:h, :w][takes] = position[takes], position[takes]
-    cut = lambda a: a.reshape(rows, TILE, columns, TILE, 3)
-    return cut(low).min((1, 3)).astype(np.float32), cut(high).max((1, 3)).astype(np.float32)
-
-
-def _shadow_box(
-    low: np.ndarray, high: np.ndarray, towards: np.ndarray, floor: float = 3.0
-) -> tuple[np.ndarray, np.ndarray]:
-    """A box that holds the shadow of what is in a box, as far as `floor` metres below it."""
-    along = -towards * (min(high[2] - low[2] + floor, 8.0) / max(float(towards[2]), 0.15))
-    return np.minimum(low, low + along), np.maximum(high, high + along)

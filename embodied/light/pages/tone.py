@@ -168,11 +168,11 @@ def displayed(x: np.ndarray) -> np.ndarray:
     y = np.maximum(x @ np.array([0.2126, 0.7152, 0.0722], np.float32), 1e-9)[..., None]
     curve = lambda v: v * (1 + v / WHITE**2) / (1 + v)
     mixed = 0.5 * (np.minimum(x * (curve(y) / y), 1.0) + curve(x))
-    return _shown_table()[(np.clip(mixed, 0, 1) * (len(_shown_table()) - 1) + 0.5).astype(np.int32)]
+    return shown_table()[(np.clip(mixed, 0, 1) * (len(shown_table()) - 1) + 0.5).astype(np.int32)]
 
 
 @functools.cache
-def _shown_table() -> np.ndarray:
+def shown_table() -> np.ndarray:
     """(n,) uint8 of values from 0 to 1, evenly."""
     t = np.linspace(0, 1, 1 << 14)
     lifted = np.where(t <= 0.0031308, 12.92 * t, 1.055 * t ** (1 / 2.4) - 0.055) * LIFT
