@@ -104,6 +104,12 @@ class SharedSyncVectorEnv(VectorObservationWrapper[dict[str, Any], Any, dict[str
         self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
         self._opened = tuple(opened)
 
+    def reset(
+        self, *, seed: Any = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """As Gymnasium's; the seed may be one of NumPy's integers, too."""
+        return super().reset(seed=int(seed) if isinstance(seed, np.integer) else seed, options=options)
+
     def step(self, actions: Any) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """One step of every slot; one that has ended is reset."""
         if len(actions) != self.num_envs:
