@@ -285,14 +285,17 @@ def test_vlnce_episodes_come_back_from_their_files(world, dataset, tmp_path):
     again = open_episodes("vlnce", worlds={world.name: world}, episodes=whole, **SMALL)
     env = ContinuousGymEnv(replace(again, observations=()))
     env.reset(options={"episode": 0})
+    with pytest.raises(TypeError, match="whole number, got 1.7"):
+        env.step(1.7)
     for action in experts["1"]["actions"]:
         info = env.step(action)[-1]
     assert info["is_success"] and info["ndtw"] > 0.95
     hundred = lambda point: [100 * v for v in point]
     start, goal, turned = item["start_position"], item["goals"], item["start_rotation"]
     for wrong, message in [
-        ({"goals": []}, "expected goals and an instruction_text"),
-        ({"instruction": {"instruction_text": None}}, "instruction_text, got .* and None"),
+        ({"goals": []}, "it should have goals"),
+        ({"instruction": {"instruction_text": None}}, "should have a str 'instruction_text'"),
+        ({"instruction": "walk on"}, "should have a dict 'instruction'"),
         ({"start_rotation": [turned[3], *turned[:3]]}, "start_rotation is .*about y"),
         ({"start_rotation": [2 * v for v in turned]}, "expected a unit quaternion"),
         ({"start_rotation": [0, 0, 0, 0]}, "expected a unit quaternion"),

@@ -220,9 +220,10 @@ def read_vlnce(path: Path) -> list[ContinuousEpisode]:
     experts = _read(beside) if beside != path and beside.exists() else {}
 
     def episode(item: Mapping[str, Any]) -> ContinuousEpisode:
-        places, text = _field(item, "goals", list, "it"), item["instruction"]["instruction_text"]
-        if not places or not isinstance(text, str):
-            raise ValueError(f"expected goals and an instruction_text, got {shown(places)} and {shown(text)}")
+        places = _field(item, "goals", list, "it")
+        text = _field(_field(item, "instruction", dict, "it"), "instruction_text", str, "its instruction")
+        if not places:
+            raise ValueError(f"it should have goals, got {shown(places)}")
         return ContinuousEpisode(
             *_begun(item),
             text,

@@ -39,7 +39,7 @@ from embodied.geometry import wrap
 from embodied.gym.drive import VIEW, LiveEnv, data_worlds, flat_worlds
 from embodied.gym.registration import register_environment
 from embodied.gym.sensors import LARGE, check_live, live_pixels, pixel_spaces
-from embodied.gym.spaces import codes_of
+from embodied.gym.spaces import codes_of, whole
 from embodied.gym.vector_env import in_step
 from embodied.kinds.plugins import record_named, titled_files
 from embodied.render.camera import camera_at
@@ -182,7 +182,7 @@ class ContinuousGymEnv(LiveEnv):
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         before = self.play.distance
-        self.play.step(int(action))
+        self.play.step(whole(action))
         stopped, info = action == HabitatAction.STOP, self._facts()
         if self.play.ended:
             info |= judged(self.play.trajectory())

@@ -142,6 +142,18 @@ def action_mask(o: Observation, layout: SpaceLayout) -> np.ndarray:
     return mask
 
 
+def whole(action: Any) -> int:
+    """A whole number of any library.
+
+    Raises:
+      TypeError: no whole number.
+    """
+    try:
+        return operator.index(action)
+    except TypeError:
+        raise TypeError(f"an action is a whole number, got {action!r:.60} ({type(action).__name__})") from None
+
+
 def decode(action: int, layout: SpaceLayout) -> Action:
     """The record behind an action's number.
 
@@ -149,10 +161,7 @@ def decode(action: int, layout: SpaceLayout) -> Action:
       ActionError: no such number.
       TypeError: no whole number.
     """
-    try:
-        action = operator.index(action)
-    except TypeError:
-        raise TypeError(f"an action is a whole number, got {action!r:.60} ({type(action).__name__})") from None
+    action = whole(action)
     if not 0 <= action < layout.actions:
         raise ActionError(
             f"action {action} does not exist; use 0 to {layout.actions - 1}: "
