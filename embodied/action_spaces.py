@@ -13,7 +13,20 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from embodied.geometry import wrap
-from embodied.interface import STEP, TURNS, VIEW_PITCHES, VIEW_YAWS, Candidates, Place, Pose
+from embodied.interface import (
+    STEP,
+    TURNS,
+    VIEW_PITCHES,
+    VIEW_YAWS,
+    Candidates,
+    Close,
+    Episode,
+    Move,
+    Open,
+    Place,
+    Pose,
+    Step,
+)
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
@@ -129,3 +142,27 @@ def node_ahead(graph: NavGraph, pose: Pose) -> int | None:
         return None
     offset = np.where(inside, np.round(np.hypot(bearing, pitch - pose.pitch), 9), np.inf)
     return int(nodes[int(np.argmin(offset))])
+
+
+def doors_moved(step: Step, graph: NavGraph, closed: frozenset[str]) -> frozenset[str]:
+    """Doors that a step opened or closed; a move opens those that it goes through.
+
+    Args:
+      closed: the doors that were closed before.
+    """
+    if not isinstance(step.action, Move | Open | Close):
+        return frozenset()
+    here, there = step.pose.node, step.candidate_nodes[step.action.candidate]
+    if isinstance(step.action, Close):
+        return frozenset(graph.doors.get((min(here, there), max(here, there)), ())) - closed
+    return frozenset(graph.barred(here, there, closed))
+
+
+def doors_in(episode: Episode, graph: NavGraph) -> list[tuple[frozenset[str], frozenset[str]]]:
+    """For each step of an episode: the doors that were closed before it, and those that it opened or closed."""
+    closed, doors = graph.closed.union(episode.task.closed), []
+    for step in episode.steps:
+        moved = doors_moved(step, graph, closed)
+        doors.append((closed, moved))
+        closed ^= moved
+    return doors

@@ -16,7 +16,7 @@ import enum
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -142,6 +142,9 @@ class SeenPlace(Place, Protocol):
     def sightings(self, node: int) -> tuple[Sighting, ...]:
         """The objects that can be seen from a node, the largest in view first."""
 
+    def with_doors(self, openness: Mapping[str, float]) -> Self:
+        """The place with some doors at another openness, 0 to 1, by opening."""
+
 
 PlaceT = TypeVar("PlaceT", bound=Place)
 PlaceT_contra = TypeVar("PlaceT_contra", bound=Place, contravariant=True)
@@ -254,7 +257,7 @@ class Task:
     id: str
     """Unique in a data set: '<world>/<kind>/<number>'."""
     kind: str
-    """Name of its TaskKind: 'find', 'vln', 'vnla', 'hanna', 'hari', 'ask', or 'module:NAME' of a kind of your own."""
+    """Name of its TaskKind: 'find', 'vln', 'vnla', 'hanna', 'hari', 'ask', 'doors', or 'module:NAME' of your own."""
     world: str
     """Name of the house (House.name)."""
     start: Pose
@@ -270,6 +273,8 @@ class Task:
     budget: float | None = None
     """Most requests for help; None is without limit. An episode rounds a fraction up with that
     probability (VNLA; docs/sources.md, S46)."""
+    closed: tuple[str, ...] = field(default=(), metadata={"unless_default": True})
+    """Doors that are closed at the start, besides those that the house has closed, in the order of the house."""
 
 
 @dataclass(frozen=True)
@@ -395,7 +400,30 @@ class Stop:
     thought: Thought | None = field(default=None, compare=False, repr=False)
 
 
-Action = Move | Ask | Stop
+@dataclass(frozen=True, slots=True)
+class Open:
+    """Open the closed doors between here and a candidate; the agent stays where it is.
+
+    Examples:
+      >>> Open(0).candidate
+      0
+    """
+
+    candidate: int
+    """Index into Observation.candidates, one of Observation.can_open."""
+    thought: Thought | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Close:
+    """Close the open doors between here and a candidate; the agent stays where it is."""
+
+    candidate: int
+    """Index into Observation.candidates, one of Observation.can_close."""
+    thought: Thought | None = field(default=None, compare=False, repr=False)
+
+
+Action = Move | Ask | Open | Close | Stop
 
 
 # What an agent is told --------------------------------------------------------------------------
@@ -531,6 +559,10 @@ class Observation:
     """The last step led to another node."""
     extras: Any = None
     """The kind's own part, an `Extras`: what HARI's and Ask's agents are told besides (embodied/envs)."""
+    can_open: tuple[int, ...] = ()
+    """Candidates behind a closed door that may be opened now; in tasks without closed doors there are none."""
+    can_close: tuple[int, ...] = ()
+    """Candidates behind a door that was closed and is open now."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -563,6 +595,8 @@ class Situation:
     """Of a free question that is being answered: its words."""
     extras: Any = None
     """The kind's own part: a record of what else its assistant knows (embodied/envs)."""
+    closed: frozenset[str] = frozenset()
+    """Doors that are closed now."""
 
 
 # What is written down ---------------------------------------------------------------------------
@@ -700,7 +734,7 @@ class Assistant(Protocol):
 class Label:
     """Judgement of a teacher about one step."""
 
-    move: Move | Stop | None
+    move: Move | Open | Stop | None
     """The reference navigation action; None: not to be learned from."""
     ask: bool | None = None
     """True where it should have asked; None: not to be learned from (no zone, or no such teacher)."""

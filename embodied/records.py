@@ -85,7 +85,8 @@ def fingerprint(**facts: object) -> dict[str, object]:
 
 def _plain(value: object) -> object:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = {f.name: _plain(getattr(value, f.name)) for f in _fields(type(value))}
+        held = [(f, getattr(value, f.name)) for f in _fields(type(value))]
+        fields = {f.name: _plain(x) for f, x in held if not f.metadata.get("unless_default") or x != f.default}
         return {"is": type(value).__name__, **fields} if type(value) in _choices() else fields
     if isinstance(value, enum.Enum):
         return value.value
@@ -141,9 +142,13 @@ def _feature(f: interface.Feature) -> str | None:
     return _angles(f.horizontal, f.vertical)
 
 
+def _candidate(a: interface.Move | interface.Open | interface.Close) -> str | None:
+    return None if a.candidate >= 0 else f"candidate should be at least 0, got {a.candidate}"
+
+
 def _step(s: interface.Step) -> str | None:
-    if isinstance(s.action, interface.Move) and s.action.candidate >= len(s.candidate_nodes):
-        return f"a move to candidate {s.action.candidate} of {len(s.candidate_nodes)}"
+    if (chosen := getattr(s.action, "candidate", -1)) >= len(s.candidate_nodes):
+        return f"a move to candidate {chosen} of {len(s.candidate_nodes)}"
     return _nodes(*s.targets, *s.candidate_nodes)
 
 
@@ -164,7 +169,9 @@ RECORD_RULES |= {
     interface.Task: _task,
     interface.Route: _route,
     interface.Feature: _feature,
-    interface.Move: lambda m: None if m.candidate >= 0 else f"candidate should be at least 0, got {m.candidate}",
+    interface.Move: _candidate,
+    interface.Open: _candidate,
+    interface.Close: _candidate,
     interface.Step: _step,
     interface.Episode: _episode,
 }

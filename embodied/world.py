@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 
 PANORAMAS_KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
+STATES_KEPT = 16
+"""Worlds with other doors closed that are held open, each with a renderer once it is drawn."""
 SLACK = 0.05
 """Metres (and three times as many radians) that a body goes until its light is computed anew."""
 log = logging.getLogger(__name__)
@@ -88,6 +90,7 @@ class World:
         self._moving: MovingHouse | None = None
         self._bodies: dict[str, tuple[Part, ...]] = {}
         self._followed: mujoco.MjModel | None = None
+        self._states: dict[tuple[tuple[str, float], ...], Self] = {}
         self._recent = functools.lru_cache(maxsize=PANORAMAS_KEPT)(self._load)
 
     @property
@@ -182,6 +185,33 @@ class World:
         """
         house = dataclasses.replace(self.house, sky=dataclasses.replace(self.house.sky, hour=hour))
         return World(house, self.catalogue, self.graph, self.cache, self.pictures)
+
+    def with_doors(self, openness: Mapping[str, float]) -> Self:
+        """The house with some doors opened or closed, otherwise at rest: a world of its own, in the same light, which
+        this one keeps and closes; itself without any. Without light, what is seen there is kept on disk.
+
+        Args:
+          openness: by opening, 0 (closed) to 1 (a right angle).
+
+        Raises:
+          ValueError: as `show`.
+        """
+        state = tuple(sorted(openness.items()))
+        if not state:
+            return self
+        if state not in self._states:
+            made_of = self.catalogue, self.graph, self.cache, self.pictures
+            moment = Moment(openness=dict(state))
+            if self.pictures.quality is None:
+                world = type(self)(moment.applied(self.house), *made_of)
+            else:
+                world = type(self)(self.house, *made_of)
+                world._bake = self.baked()
+                world.show(moment)
+            self._states[state] = world
+            if len(self._states) > STATES_KEPT:
+                self._states.pop(next(iter(self._states))).close()
+        return self._states[state]
 
     def _bring_up_to_date(self, slack: float = 0.0) -> None:
         """Draw the moment from now on."""
@@ -395,6 +425,9 @@ class World:
             self._renderer.close()
         self._renderer = self._tracer = self._moving = None
         self._moments = [Moment()]
+        for world in self._states.values():
+            world.close()
+        self._states = {}
         if self._file is not None:
             self._file.close()
             self._file = None

@@ -11,6 +11,7 @@ Entity tree (timeline 'step'):
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -18,9 +19,11 @@ import numpy as np
 import rerun as rr
 from scipy.spatial.transform import Rotation
 
-from embodied.interface import Ask, Episode, Mode, Move, Pose, Step, Stop, Task
+from embodied.action_spaces import doors_moved
+from embodied.interface import Ask, Close, Episode, Mode, Move, Open, Pose, Step, Stop, Task
 from embodied.kinds.task_kind import kind_named
 from embodied.language.detokenize import detokenized
+from embodied.navigation.doors import place_named, seen_name
 from embodied.navigation.free_space import EYE
 from embodied.render.camera import camera_at
 from embodied.render.jpeg import jpeg
@@ -78,6 +81,11 @@ class Views:
     recognise: Recognise | None = None
     """Names what the agent's encoder recognises."""
 
+    def with_closed(self, node: int, closed: frozenset[str]) -> Views:
+        """The same from a node while some doors are closed."""
+        name = seen_name(self.seen.house, self.seen.graph, node, closed)
+        return dataclasses.replace(self, seen=place_named({self.seen.name: self.seen}, name))
+
 
 def record(
     recording: rr.RecordingStream,
@@ -109,15 +117,17 @@ def record(
     log_task(recording, world, task)
     vfov = ONE_VIEW if kind_named(task.kind).monocular else VIEW_VFOV
     state, views = EpisodeLog(task, budget), Views(eyes or world, pictures, vfov, recognise)
+    closed = world.graph.closed.union(task.closed)
     for index, step in enumerate(steps):
         recording.set_time("step", sequence=index)
         if step.seconds is not None:  # people took part
             recording.set_time("seconds", duration=step.seconds)
-        log_step(recording, world, task, step, state, views)
+        log_step(recording, world, task, step, state, views.with_closed(step.pose.node, closed))
+        closed ^= doors_moved(step, world.graph, closed)
         yield step
     if state.last is not None:
         recording.set_time("step", sequence=state.count)
-        log_end(recording, world, task, state, views)
+        log_end(recording, world, task, state, views.with_closed(state.last.next_pose.node, closed))
 
 
 def record_episode(
@@ -379,6 +389,8 @@ def event_text(world: World, step: Step) -> str:
         return f"goes on in the {room}" if to == room else f"goes from the {room} to the {to}"
     if isinstance(step.action, Stop):
         return f"stops in the {room}"
+    if isinstance(step.action, Open | Close):
+        return f"{type(step.action).__name__.lower()}s a door in the {room}"
     return f"asks in the {room}: {question_of(step.action)}"
 
 

@@ -15,7 +15,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from embodied.agents.common.rows import Rows
-from embodied.interface import Move, Observation, Stop
+from embodied.interface import Move, Observation, Open, Stop
 
 VIEWS = 36
 HEADINGS = 12
@@ -108,6 +108,6 @@ def candidate_rows(observations: Sequence[Observation]) -> tuple[np.ndarray, np.
     return views, angles, mask
 
 
-def action_index(action: Move | Stop) -> int:
-    """Place of a navigation action in the networks' scores: stop is 0."""
+def action_index(action: Move | Open | Stop) -> int:
+    """Place of a navigation action in the networks' scores: stop is 0; opening a door is that of going through it."""
     return 0 if isinstance(action, Stop) else action.candidate + 1

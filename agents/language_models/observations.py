@@ -18,7 +18,21 @@ from embodied.assistants.words import side
 from embodied.geometry import wrap
 from embodied.gym.sensors import PanoramaStore
 from embodied.house.floor_plan import font
-from embodied.interface import STEP, VIEW_PITCHES, Action, Ask, Move, Observation, SeenPlace, Sight, Stop, viewpoint
+from embodied.interface import (
+    STEP,
+    VIEW_PITCHES,
+    Action,
+    Ask,
+    Close,
+    Move,
+    Observation,
+    Open,
+    SeenPlace,
+    Sight,
+    Stop,
+    viewpoint,
+)
+from embodied.navigation.doors import place_named
 from embodied.render.panorama import Panorama
 
 MOST_NAMES = 12
@@ -44,7 +58,7 @@ def oracle_names(worlds: Mapping[str, SeenPlace]) -> Names:
 
     def names(sight: Sight) -> list[tuple[str, float, float]]:
         here = viewpoint(sight)
-        seen = worlds[here.world].sightings(here.node)
+        seen = place_named(worlds, here.world).sightings(here.node)
         return [(s.object_class, s.yaw, s.distance) for s in seen if s.pixels >= SMALLEST_SIGHTING][:MOST_NAMES]
 
     return names
@@ -56,6 +70,7 @@ def actions_by_name(o: Observation) -> dict[str, Action]:
     moves: dict[str, Action] = {
         (c.words[i] if c.words else f"go {i}"): Move(i) for i in range(len(c)) if bool(c.allowed[i])
     }
+    moves |= {f"open {i}": Open(i) for i in o.can_open} | {f"close {i}": Close(i) for i in o.can_close}
     return {**moves, **{f"ask {i.value}": Ask(i) for i in o.can_ask}, "stop": Stop()}
 
 
@@ -69,7 +84,8 @@ def candidates_in_words(o: Observation, names: Sequence[tuple[str, float, float]
         towards = f", towards the {min(off)[1]}" if off and min(off)[0] < STEP / 2 else ""
         slope = float(o.candidates.slope[i])
         stairs = "" if abs(slope) < math.radians(15) else f", {'up' if slope > 0 else 'down'} the stairs"
-        clauses.append(f"go {i}: {side(float(bearing))}{towards}{stairs}")
+        door = ", behind a closed door" if i in o.can_open else ""
+        clauses.append(f"go {i}: {side(float(bearing))}{towards}{stairs}{door}")
     return "; ".join(clauses) or "nowhere"
 
 

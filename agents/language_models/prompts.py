@@ -24,7 +24,7 @@ from embodied.agents.language_models.observations import (
 from embodied.assets.json_file import read_text
 from embodied.assistants.words import side
 from embodied.gym.sensors import PanoramaStore
-from embodied.interface import Action, Ask, Intention, Observation, Stop
+from embodied.interface import Action, Ask, Intention, Move, Observation, Open, Stop
 
 PROMPTS = Path(__file__).parent / "prompts"
 REMEMBERED_STEPS = 8
@@ -140,4 +140,7 @@ def action_in_words(o: Observation, action: Action) -> str:
         return "You stopped."
     if o.candidates.words:
         return f"You did {o.candidates.words[action.candidate]}."
-    return f"You went {side(float(o.candidates.bearing[action.candidate]))}."
+    where = side(float(o.candidates.bearing[action.candidate]))
+    if isinstance(action, Move):
+        return f"You went {where}."
+    return f"You {'opened' if isinstance(action, Open) else 'closed'} the door {where}."

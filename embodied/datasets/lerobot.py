@@ -210,6 +210,8 @@ def _add(writer: Writer, episode: Episode, place: Place, pictures: Path, succeed
     """One more episode."""
     if not episode.steps:
         raise ValueError(f"the episode of {episode.task.id!r} has no step; leave it out")
+    if episode.task.closed:
+        raise ValueError(f"task {episode.task.id!r} closes doors, which stored pictures show open; leave it out")
     rows = {
         "observation.state": np.stack([state(s.pose, place) for s in episode.steps]),
         "action": np.stack([action(s, place) for s in episode.steps]),

@@ -24,7 +24,7 @@ import pyarrow.parquet as pq
 from embodied.assets.cache import atomic_path, write_bytes
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.folders import filled
-from embodied.interface import Ask, Episode, Move
+from embodied.interface import Ask, Close, Episode, Move, Open
 from embodied.records import load_lines, to_json
 
 if TYPE_CHECKING:
@@ -140,9 +140,9 @@ def _played(data: Dataset, path: Path) -> Iterator[Episode]:
 
 
 def _said(action: object) -> str:
-    """'move 2', 'ask help' or 'stop'."""
-    if isinstance(action, Move):
-        return f"move {action.candidate}"
+    """'move 2', 'open 2', 'ask help' or 'stop'."""
+    if isinstance(action, Move | Open | Close):
+        return f"{type(action).__name__.lower()} {action.candidate}"
     return f"ask {action.intention.value}" if isinstance(action, Ask) else "stop"
 
 

@@ -18,7 +18,7 @@ from embodied.kinds.task_kind import EnvInputs, EnvMaker, TaskInputs, TaskKind, 
 from embodied.language.plain_language import PlainLanguage
 from embodied.language.utterances import PeoplesWords, Utterance
 from embodied.navigation.connectivity import from_matterport
-from embodied.navigation.graph import NavGraph
+from embodied.navigation.graph import NavGraph, with_edge_doors
 from embodied.records import read_lines
 from embodied.render.pictures import PictureSettings, Unlit, from_recorded, parse_pictures
 
@@ -132,9 +132,8 @@ class Dataset:
             home = self.folder / "houses" / name
             for file in ("house.json", "connectivity.json"):
                 self._content(name, file)
-            self._places[name] = StoredPlace(
-                House.load(home / "house.json"), from_matterport(home / "connectivity.json")
-            )
+            house = House.load(home / "house.json")
+            self._places[name] = StoredPlace(house, with_edge_doors(from_matterport(home / "connectivity.json"), house))
         return self._places[name]
 
     def place_of(self, episode: Episode) -> StoredPlace:

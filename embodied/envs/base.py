@@ -8,14 +8,16 @@ does, what stopping does, and what may be asked.
 from __future__ import annotations
 
 import dataclasses
+import enum
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
-from embodied.action_spaces import Moves, PanoramicMoves
+from embodied.action_spaces import Moves, PanoramicMoves, doors_moved
 from embodied.interface import (
     Action,
     Ask,
     Assistant,
+    Close,
     Episode,
     Extras,
     FindDescribed,
@@ -24,6 +26,7 @@ from embodied.interface import (
     Mode,
     Move,
     Observation,
+    Open,
     Place,
     Reply,
     Sight,
@@ -34,6 +37,8 @@ from embodied.interface import (
     Task,
     Viewpoint,
 )
+from embodied.navigation.doors import seen_name
+from embodied.navigation.graph import behind_doors
 from embodied.seeds import checked_seed, stream
 
 T = TypeVar("T")
@@ -49,6 +54,17 @@ class ActionError(ValueError):
     """An action that is not possible now; the episode is unchanged and can go on."""
 
 
+class DoorRule(enum.Enum):
+    """Effects of a move towards a closed door."""
+
+    OPEN = "open"
+    """It is masked: the agent has to open the door by an action of its own."""
+    PUSH = "push"
+    """It is the action of opening the door: the agent stays, and can go on by the next move."""
+    WALK = "walk"
+    """It opens the door and goes through, for agents that know nothing of doors."""
+
+
 class HelpEnv:
     """Plays one task at a time; without an assistant this is plain navigation ('find' and VLN).
 
@@ -58,6 +74,7 @@ class HelpEnv:
 
     asking_takes_time = True
     """A request uses up a step of the horizon (Algorithms 6 and 7)."""
+    doors: DoorRule = DoorRule.OPEN
 
     def __init__(
         self, worlds: Mapping[str, Place], assistant: Assistant | None = None, moves: Moves | None = None
@@ -94,6 +111,7 @@ class HelpEnv:
         self.ended = None
         self._steps = []
         self._trail: list[int] = []
+        self.closed = self.world.graph.closed.union(task.closed)
         self._begin()
         return self._look()
 
@@ -105,6 +123,8 @@ class HelpEnv:
             can be asked that here. Nothing has changed then.
         """
         self._check(action)
+        if isinstance(action, Move) and self.doors is DoorRule.PUSH and self._barred(action.candidate):
+            action = Open(action.candidate, action.thought)
         before, situation = self.observation, self.situation
         mode, instruction, targets, subtask = self.mode, self.instruction, self.targets, self.subtask
         reply, cost = None, self._cost(action)
@@ -118,27 +138,27 @@ class HelpEnv:
             reply = required(self.assistant, "assistant").answer(asked, action.intention, rng=rng)
             self.requests += 1
             self._replied(reply)
-        else:
+        elif isinstance(action, Stop):
             self._stopped()
         if self.asking_takes_time or not isinstance(action, Ask):
             self.time += 1
         if self.ended is None and self.time >= self.task.horizon:
             self.ended = "limit"
-        self._steps.append(
-            Step(
-                pose=situation.pose,
-                mode=mode,
-                instruction=instruction,
-                targets=targets,
-                subtask=subtask.id if subtask else "none",
-                can_ask=before.can_ask,
-                candidate_nodes=situation.candidate_nodes,
-                action=action,
-                reply=reply,
-                next_pose=self.pose,
-                cost=cost,
-            )
+        step = Step(
+            pose=situation.pose,
+            mode=mode,
+            instruction=instruction,
+            targets=targets,
+            subtask=subtask.id if subtask else "none",
+            can_ask=before.can_ask,
+            candidate_nodes=situation.candidate_nodes,
+            action=action,
+            reply=reply,
+            next_pose=self.pose,
+            cost=cost,
         )
+        self._steps.append(step)
+        self.closed ^= doors_moved(step, self.world.graph, self.closed)
         return self._look() if self.ended is None else None
 
     def cut_short(self) -> None:
@@ -155,7 +175,7 @@ class HelpEnv:
 
     def potential(self) -> float:
         """How far the goal is, for a shaped reward: metres to the nearest goal / 10."""
-        distance = self.world.graph.distance
+        distance = behind_doors(self.world.graph, self.closed).distance
         return min(float(distance[self.pose.node, g]) for g in self.task.goal_nodes) / 10.0
 
     @property
@@ -234,6 +254,11 @@ class HelpEnv:
     def _look(self) -> Observation:
         self._reach = self.moves.at(self.world, self.pose)
         candidates, poses = self._reach
+        barred = [k for k in range(len(poses)) if self.closed and self._barred(k)]
+        if barred and self.doors is DoorRule.OPEN:
+            allowed = candidates.allowed.copy()
+            allowed[barred] = False
+            candidates = dataclasses.replace(candidates, allowed=allowed)
         if len(self._trail) <= self.time:
             self._trail.append(self.pose.node)
         left = None if self.budget is None else max(self.budget - self.requests, 0)
@@ -251,9 +276,10 @@ class HelpEnv:
             requests_left=left,
             trail=tuple(self._trail),
             extras=self._truth(),
+            closed=self.closed,
         )
         self.observation = Observation(
-            sight=Sight(self.task.world, self.pose.node),
+            sight=Sight(self._seen(), self.pose.node),
             turn=self.pose.turn,
             tilt=self.pose.tilt,
             candidates=candidates,
@@ -266,8 +292,28 @@ class HelpEnv:
             time_on_task=self.time_on_task,
             moved=bool(self._steps) and self._steps[-1].pose.node != self.pose.node,
             extras=self._extras(),
+            can_open=tuple(barred),
+            can_close=self._closable(),
         )
         return self.observation
+
+    def _barred(self, candidate: int) -> tuple[str, ...]:
+        """The closed doors on the way to a candidate."""
+        here, there = self.pose.node, self._reach[1][candidate].node
+        return self.world.graph.barred(here, there, self.closed) if here != there else ()
+
+    def _closable(self) -> tuple[int, ...]:
+        """Candidates behind a door that was closed at the start and is open now."""
+        opened = self.world.graph.closed.union(self.task.closed) - self.closed
+        here, graph = self.pose.node, self.world.graph
+        return tuple(k for k, p in enumerate(self._reach[1]) if opened and graph.barred(here, p.node, opened))
+
+    def _seen(self) -> str:
+        """Name of what is seen from here, doors as they are."""
+        house, graph = self.world.house, self.world.graph
+        if self.closed == graph.closed:
+            return self.task.world
+        return seen_name(house, graph, self.pose.node, self.closed)
 
     def _check(self, action: Action) -> None:
         if self.ended is not None:
@@ -284,8 +330,12 @@ class HelpEnv:
                 raise ActionError(
                     f"cannot ask {action.intention.value!r} here, only {can}; look at Observation.can_ask"
                 )
+        elif isinstance(action, Open | Close):
+            can_move = self.observation.can_open if isinstance(action, Open) else self.observation.can_close
+            if action.candidate not in can_move:
+                raise ActionError(f"{action} is not possible here, only of the candidates {list(can_move)}")
         elif not isinstance(action, Stop):
-            raise ActionError(f"expected Move, Ask or Stop, got {action!r}")
+            raise ActionError(f"expected Move, Ask, Open, Close or Stop, got {action!r}")
 
 
 def required(value: T | None, what: str) -> T:
@@ -319,6 +369,9 @@ def check_task(task: Task, worlds: Mapping[str, Place]) -> None:
     things: tuple[str, ...] = getattr(goal, "placements", ())
     if isinstance(goal, FindDescribed):
         things = (goal.placement, *goal.fitting, *goal.similar)
+    doors = {d for passed in world.graph.doors.values() for d in passed}
+    if unknown := sorted(set(task.closed) - doors):
+        raise TaskError(f"task {task.id!r} closes {unknown}; doors that bar ways of {task.world!r} are {sorted(doors)}")
     missing = [p for p in things if p not in house.placement_by_id] + [r for r in rooms if r not in house.room_by_id]
     if missing:
         raise TaskError(f"task {task.id!r} looks for {missing}, not in the house {task.world!r}; sample it again")

@@ -11,7 +11,20 @@ from pathlib import Path
 from typing import Any
 
 from embodied.errors import UnableError
-from embodied.interface import Action, Actions, Agent, Ask, Intention, Move, Observation, Observations, Rngs, Stop
+from embodied.interface import (
+    Action,
+    Actions,
+    Agent,
+    Ask,
+    Close,
+    Intention,
+    Move,
+    Observation,
+    Observations,
+    Open,
+    Rngs,
+    Stop,
+)
 from embodied.kinds.plugins import made_by_name
 from embodied.records import RecordError, parse
 
@@ -115,20 +128,25 @@ def observed(o: Observation) -> dict[str, object]:
             for b, s in zip(c.bearing, c.slope, strict=True)
         ],
         "can_ask": [i.value for i in o.can_ask],
+        **({"can_open": list(o.can_open), "can_close": list(o.can_close)} if o.can_open or o.can_close else {}),
         **({} if o.extras is None else o.extras.as_json()),
     }
 
 
 def acted(o: Observation, answer: bytes) -> Action:
-    """The action of an answer: 'go 0', 'ask region', 'stop'; with 'question' for a free one. Anything else stops."""
+    """The action of an answer: 'go 0', 'open 1', 'ask region', 'stop'; with 'question' for a free one; else a stop."""
     try:
         body = parse(answer[: MOST_BYTES + 1], "an action")
     except RecordError:
         return Stop()
     word = body.get("action") if isinstance(body, dict) else None
     verb, _, what = word.partition(" ") if isinstance(word, str) else ("", "", "")
-    if verb == "go" and what.isdigit() and len(what) < 4 and int(what) < len(o.candidates):
-        return Move(int(what))
+    if what.isdigit() and len(what) < 4:
+        k = int(what)
+        if verb == "go" and k < len(o.candidates) and o.candidates.allowed[k]:
+            return Move(k)
+        if (verb == "open" and k in o.can_open) or (verb == "close" and k in o.can_close):
+            return Open(k) if verb == "open" else Close(k)
     if verb == "ask" and what in {i.value for i in o.can_ask}:
         question = body.get("question") if isinstance(body, dict) else None
         return Ask(Intention(what), question=question[:300] if isinstance(question, str) else None)

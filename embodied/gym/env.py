@@ -27,7 +27,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageOps
 
 from embodied.envs.base import STEP_COST, ActionError, HelpEnv
-from embodied.gym.playground import Playground, PlaygroundSettings, flat_playground, split_playground
+from embodied.gym.playground import Playground, PlaygroundSettings, flat_playground, seen_features, split_playground
 from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.sensors import (
     PIXELS,
@@ -47,6 +47,7 @@ from embodied.interface import FeatureSource, Observation, Place, Pose, SeenPlac
 from embodied.kinds.metrics import PER_EPISODE
 from embodied.kinds.task_kind import kind_named
 from embodied.language.detokenize import detokenized
+from embodied.navigation.doors import place_named
 from embodied.scene.house_meshes import instance_classes
 from embodied.seeds import checked_seed
 from embodied.world import World
@@ -395,8 +396,13 @@ def _sensor_of(play: Playground, wanted: EnvironmentSettings) -> Sensor:
         source = wanted.source if wanted.source is not None else encoder_entry().load()(store)
         sensors.append(FeatureSensor("features", source))
     if "oracle" in seen:
-        sensors.append(FeatureSensor("oracle", FeatureTable(play.features)))
+        oracle = lambda name: _oracle_of(place_named(drawn, name))
+        sensors.append(FeatureSensor("oracle", FeatureTable(play.features, oracle)))
     return SensorSuite(sensors)
+
+
+def _oracle_of(world: World) -> np.ndarray:
+    return seen_features(world, world.catalogue, world.cache)
 
 
 def require_rendered(worlds: Mapping[str, SeenPlace], drawn: Mapping[str, World]) -> None:

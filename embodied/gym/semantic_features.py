@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -59,14 +60,25 @@ class SightRows:
 class FeatureTable:
     """A FeatureSource over arrays that are already there."""
 
-    def __init__(self, worlds: Mapping[str, np.ndarray]) -> None:
-        """`worlds`: (nodes, 36, D) features by world name; raises ValueError for another shape."""
+    def __init__(self, worlds: Mapping[str, np.ndarray], with_doors: Callable[[str], np.ndarray] | None = None) -> None:
+        """
+        Args:
+          worlds: (nodes, 36, D) features by world name.
+          with_doors: makes those of a world with other doors closed, by the name of what is seen there.
+
+        Raises:
+          ValueError: another shape.
+        """
+        self._with_doors = with_doors and functools.cache(with_doors)
         self._rows = SightRows(worlds)
         self._table = self._rows.filled(worlds)
         self.size = self._rows.size
 
     def features(self, sight: Sight) -> np.ndarray:
         """(36, D) float32, read-only by convention; raises KeyError for a place of another world."""
+        at = viewpoint(sight)
+        if self._with_doors and at.world not in self._rows.spans:
+            return self._with_doors(at.world)[at.node]
         return self._table[self._rows.row(sight)]
 
 

@@ -20,6 +20,7 @@ from gymnasium import spaces
 
 from embodied.errors import UnableError
 from embodied.interface import STEP, VIEWS, FeatureSource, Observation, Sight, Viewpoint, viewpoint
+from embodied.navigation.doors import place_named
 from embodied.render.camera import Camera
 from embodied.render.panorama import VFOV36, Panorama, equirect_grid, grid36, perspective_grid
 from embodied.render.photograph import PhotoCamera, check_camera
@@ -199,7 +200,7 @@ class PanoramaStore:
                 break
             self._kept.popitem(last=False)
             held -= size
-        self._kept[key] = self._worlds[key.world].panorama(key.node)
+        self._kept[key] = place_named(self._worlds, key.world).panorama(key.node)
         return self._kept[key]
 
 

@@ -13,7 +13,7 @@ from gymnasium import spaces
 
 from embodied.envs.base import ActionError
 from embodied.gym.sensors import LARGE, Sensor
-from embodied.interface import TURNS, VIEWS, Action, Ask, Intention, Mode, Move, Observation, Stop
+from embodied.interface import TURNS, VIEWS, Action, Ask, Close, Intention, Mode, Move, Observation, Open, Stop
 from embodied.kinds.task_kind import INTENTIONS, ArraySpec, TaskKind, kind_named
 
 LONG, MANY = 100.0, 10.0
@@ -34,18 +34,26 @@ class SpaceLayout:
     """Arrays of the kind's own part of the observation, by name."""
     kind: str = ""
     """Name of the kind, which fills them."""
+    doors: bool = False
+    """Doors can be opened and closed."""
 
     @classmethod
     def of(cls, kind: TaskKind, rules: Any = None, *, candidates: int = 16) -> SpaceLayout:
         """The layout of a kind of task under its rules of play."""
-        if kind.extras is None:
-            return cls(candidates, intentions=kind.intentions)
-        specs = kind.extras.specs(candidates, kind.checked_rules(rules))
-        return cls(candidates, intentions=kind.intentions, extras=specs, kind=kind.name)
+        own = dict[str, Any](intentions=kind.intentions, doors=kind.opens_doors)
+        if kind.extras is not None:
+            own |= {"extras": kind.extras.specs(candidates, kind.checked_rules(rules)), "kind": kind.name}
+        return cls(candidates, **own)
 
     @property
     def actions(self) -> int:
-        """Moves, then stop, then one request per intention."""
+        """Moves, then stop, then one request per intention, then, with doors, opening those on the way to each
+        candidate, and closing them."""
+        return self.first_door + 2 * self.candidates * self.doors
+
+    @property
+    def first_door(self) -> int:
+        """The number of opening what is on the way to the first candidate."""
         return self.candidates + 1 + len(self.intentions)
 
 
@@ -139,6 +147,9 @@ def action_mask(o: Observation, layout: SpaceLayout) -> np.ndarray:
     mask[layout.candidates] = 1
     for intention in o.can_ask:
         mask[layout.candidates + 1 + layout.intentions.index(intention)] = 1
+    if layout.doors:
+        mask[[layout.first_door + k for k in o.can_open]] = 1
+        mask[[layout.first_door + layout.candidates + k for k in o.can_close]] = 1
     return mask
 
 
@@ -165,12 +176,15 @@ def decode(action: int, layout: SpaceLayout) -> Action:
     if not 0 <= action < layout.actions:
         raise ActionError(
             f"action {action} does not exist; use 0 to {layout.actions - 1}: "
-            f"{layout.candidates} candidates, stop, and the {len(layout.intentions)} ways to ask"
+            f"{layout.candidates} candidates, stop, the {len(layout.intentions)} ways to ask, and doors, if any"
         )
     if action < layout.candidates:
         return Move(action)
     if action == layout.candidates:
         return Stop()
+    if action >= layout.first_door:
+        closes, candidate = divmod(action - layout.first_door, layout.candidates)
+        return Close(candidate) if closes else Open(candidate)
     return Ask(layout.intentions[action - layout.candidates - 1])
 
 
@@ -180,4 +194,6 @@ def number(action: Action, layout: SpaceLayout) -> int:
         return action.candidate
     if isinstance(action, Stop):
         return layout.candidates
+    if isinstance(action, Open | Close):
+        return layout.first_door + layout.candidates * isinstance(action, Close) + action.candidate
     return layout.candidates + 1 + layout.intentions.index(action.intention)

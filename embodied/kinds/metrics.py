@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from embodied.action_spaces import doors_in
 from embodied.interface import Ask, Episode, Intention, Move, SuccessRule, Trajectory, Usage
 from embodied.kinds.task_kind import Measure, kind_named
+from embodied.navigation.graph import OPENING, behind_doors
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
@@ -21,17 +23,22 @@ if TYPE_CHECKING:
 def trajectory_of(episode: Episode, graph: NavGraph) -> Trajectory:
     """An episode on a graph as it is judged.
 
-    Its way is as long as the graph's distances between consecutive nodes (docs/sources.md, S4). The shortest way is
-    what the kind of task says, or that from the start to the goal nearest the *final* node.
+    Its way is as long as the graph's distances between consecutive nodes (docs/sources.md, S4), and OPENING longer for
+    each door that is opened or closed. The shortest way is what the kind of task says, or that from the start to the
+    goal nearest the *final* node, with the doors that it opens.
     """
     task, kind, nodes, goals = episode.task, kind_named(episode.task.kind), [*episode.nodes], [*episode.task.goal_nodes]
     metres, steps = np.asarray(graph.distance), np.asarray(graph.distance)[nodes[:-1], nodes[1:]]
     goal = min(goals, key=lambda g: (metres[nodes[-1], g], g))
+    closed = graph.closed.union(task.closed)
+    if closed:
+        steps = steps + [OPENING * len(moved) for _, moved in doors_in(episode, graph)]
+    shortest = behind_doors(graph, closed).distance[nodes[0], goal]
     return Trajectory(
         rule=SuccessRule(task.radius, needs_stop=kind.needs_stop),
         distances=metres[np.ix_(nodes, goals)].min(axis=1),
         lengths=np.concatenate([[0.0], np.cumsum(steps)]),
-        shortest=float(kind.shortest(episode, graph) if kind.shortest else metres[nodes[0], goal]),
+        shortest=float(kind.shortest(episode, graph) if kind.shortest else shortest),
         stopped=episode.ended == "stop",
         achieved=kind.success and kind.success(episode, graph),
     )

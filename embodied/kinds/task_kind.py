@@ -231,6 +231,8 @@ class TaskKind:
     """Questions that may be asked, in the order of the actions' numbers."""
     extras: ExtraArrays | None = None
     """Of a kind whose environments fill in Observation.extras."""
+    opens_doors: bool = False
+    """Opening and closing doors are among its agents' actions."""
     monocular: bool = False
     """Agents turn on the spot and see one view at a time, not a panorama."""
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+import dataclasses
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 
 import numpy as np
 import shapely
@@ -14,6 +15,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from embodied.house.house import DOORS, House, HouseError, Room
+from embodied.navigation.doors import OPEN_FROM, closed_doors, doors_of_edges, with_doors
 from embodied.navigation.free_space import EYE, free_floor, sight_floor
 
 AGENT_RADIUS = 0.2
@@ -28,6 +30,8 @@ VIEWS_COMPARED = 48
 """Candidates per viewpoint whose views of the others are compared."""
 CROWDED = 0.6
 """Viewpoints closer than this, in units of the wanted spacing, are thinned where they can be."""
+OPENING = 1.0
+"""Metres of way that opening or closing a door counts as: it takes about as long as to walk them."""
 LONGEST_EDGE = 2.0
 """Longest edge in units of the wanted spacing: 4.5 m; 95 % of Matterport3D's edges are shorter than 5 m."""
 
@@ -55,6 +59,14 @@ class NavGraph:
     """(n, n) float64: length of the shortest path, metres."""
     next_hop: np.ndarray
     """(n, n) int64: the node after i on the shortest path from i to j; i where i == j."""
+    doors: Mapping[tuple[int, int], tuple[str, ...]] = field(default_factory=dict)
+    """By edge (i, j), i < j: the doors that it passes, which must be open; edges that pass none are left out."""
+    closed: frozenset[str] = frozenset()
+    """Doors that the house at rest has closed."""
+
+    def barred(self, a: int, b: int, closed: Collection[str]) -> tuple[str, ...]:
+        """The closed doors between two neighbours."""
+        return tuple(d for d in self.doors.get((min(a, b), max(a, b)), ()) if d in closed)
 
     def neighbours(self, node: int) -> tuple[int, ...]:
         """Nodes one edge away, ascending."""
@@ -88,15 +100,43 @@ def graph_of(positions: np.ndarray, edges: np.ndarray, ids: tuple[str, ...], roo
     n = len(positions)
     edges = np.unique(np.sort(np.asarray(edges, dtype=np.int64).reshape(-1, 2), axis=1), axis=0)
     lengths = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)
-    matrix = csr_matrix((lengths, edges.T), shape=(n, n))
-    distance, before = dijkstra(matrix, directed=False, return_predecessors=True)
+    distance, next_hop = _all_pairs(edges, lengths, n)
     if not np.isfinite(distance).all():
         lone = [ids[k] for k in np.flatnonzero(~np.isfinite(distance[0]))[:5]]
         raise HouseError(f"navigation graph is not connected: {lone} cannot be reached from {ids[0]!r}")
-    distance = (distance + distance.T) / 2
+    return NavGraph(positions, tuple(ids), tuple(rooms), edges, lengths, distance, next_hop)
+
+
+def _all_pairs(edges: np.ndarray, lengths: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """(n, n) distances and (n, n) next hops; infinite where there is no way."""
+    distance, before = dijkstra(csr_matrix((lengths, edges.T), shape=(n, n)), directed=False, return_predecessors=True)
     next_hop = before.T.astype(np.int64).copy()
     np.fill_diagonal(next_hop, np.arange(n))
-    return NavGraph(positions, tuple(ids), tuple(rooms), edges, lengths, distance, next_hop)
+    return (distance + distance.T) / 2, next_hop
+
+
+def with_edge_doors(graph: NavGraph, house: House, open_from: float = OPEN_FROM) -> NavGraph:
+    """The graph with the doors that its edges pass, and those that are closed: open by less than `open_from`."""
+    doors = doors_of_edges(graph.positions, graph.edges, house)
+    return dataclasses.replace(graph, doors=doors, closed=closed_doors(house, open_from))
+
+
+@lru_cache(maxsize=64)
+def behind_doors(graph: NavGraph, closed: frozenset[str], opening: float = OPENING) -> NavGraph:
+    """The graph with ways that open doors on them: distances count `opening` metres for each.
+
+    Args:
+      closed: the doors that are closed now; without any, the graph itself.
+      opening: metres; infinite for who opens none, for whom some nodes are then infinitely far.
+    """
+    barred = np.array([len(graph.barred(a, b, closed)) for a, b in graph.edges.tolist()]) if closed else np.zeros(1)
+    if not barred.any():
+        return graph
+    lengths = graph.lengths.copy()
+    lengths[barred > 0] += opening * barred[barred > 0]
+    passable = np.isfinite(lengths)
+    distance, next_hop = _all_pairs(graph.edges[passable], lengths[passable], len(graph.ids))
+    return dataclasses.replace(graph, lengths=lengths, distance=distance, next_hop=next_hop)
 
 
 def nearest(graph: NavGraph, node: int, targets: Sequence[int]) -> int:
@@ -121,12 +161,17 @@ def count_hops(next_hop: np.ndarray) -> np.ndarray:
     raise ValueError("next_hop does not lead everywhere in n steps; rebuild the graph")
 
 
-def build_graph(house: House, *, spacing: float = 2.25) -> NavGraph:
+def build_graph(house: House, *, spacing: float = 2.25, open_from: float = OPEN_FROM) -> NavGraph:
     """The house's viewpoints, about `spacing` metres apart, joined where one walks straight.
 
     A node or an edge keeps the agent's radius from walls, leaves and everything that stands between
     4 cm and 1.8 m above the floor; placements count with their rotated bounding rectangles. A line so
-    free is also a free line of sight at eye height. Deterministic: nothing is drawn.
+    free is also a free line of sight at eye height. Edges lead through closed doors, too, as if they stood wide open;
+    NavGraph.doors says which must be opened first. Deterministic: nothing is drawn.
+
+    Args:
+      spacing: metres.
+      open_from: openness, 0 to 1, from which a door counts as open.
 
     Raises:
       HouseError: a room that cannot be entered on foot.
@@ -134,6 +179,7 @@ def build_graph(house: House, *, spacing: float = 2.25) -> NavGraph:
     Examples:
       >>> graph = embodied.build_graph(house)
     """
+    rest, house = house, with_doors(house, dict.fromkeys(sorted(closed_doors(house, open_from)), 1.0))
     positions: list[tuple[float, float, float]] = []
     rooms: list[str] = []
     edges: list[tuple[int, int]] = []
@@ -143,7 +189,7 @@ def build_graph(house: House, *, spacing: float = 2.25) -> NavGraph:
         positions += [(x, y, house.storeys[storey].elevation + EYE) for x, y in xy]
         rooms += room
     ids = tuple(f"v{k:03d}" for k in range(len(positions)))
-    return graph_of(np.round(positions, 4), np.asarray(edges), ids, tuple(rooms))
+    return with_edge_doors(graph_of(np.round(positions, 4), np.asarray(edges), ids, tuple(rooms)), rest, open_from)
 
 
 def walkable(house: House, storey: int = 0) -> shapely.Geometry:

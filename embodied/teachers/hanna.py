@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.interface import VIEWS, Ask, Candidates, Episode, Label, Move, Place, Step, Stop
+from embodied.interface import VIEWS, Ask, Candidates, Episode, Label, Move, Open, Place, Step, Stop
 from embodied.navigation.graph import nearest
 from embodied.teachers.shortest import ShortestTeacher, shortest_action
 
@@ -77,7 +77,7 @@ class HannaTeacher(ShortestTeacher):
                 past[_chosen(step)] = None
         return tuple(labels)
 
-    def _uncertain_wrong(self, step: Step, reference: Move | Stop, world: Place) -> bool:
+    def _uncertain_wrong(self, step: Step, reference: Move | Open | Stop, world: Place) -> bool:
         thought = step.action.thought
         if thought is None or thought.moves is None:
             return False

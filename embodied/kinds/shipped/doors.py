@@ -1,0 +1,108 @@
+"""Doors: find a thing of a class in a house in which doors are closed (docs/doors.md)."""
+
+from __future__ import annotations
+
+import functools
+
+from embodied.action_spaces import PanoramicMoves, doors_in
+from embodied.envs.base import DoorRule, HelpEnv
+from embodied.interface import Close, Episode, Task
+from embodied.kinds.metrics import success
+from embodied.kinds.task_kind import (
+    EnvInputs,
+    EnvMaker,
+    Metric,
+    Parts,
+    PartTasks,
+    StoryStyle,
+    TaskInputs,
+    TaskKind,
+    parts_of_pool,
+    register_kind,
+)
+from embodied.navigation.graph import NavGraph, behind_doors
+from embodied.policies.baselines import Shortest
+from embodied.policies.doors import NeverOpens, RandomOpener, Wanderer
+from embodied.tasks.doors import with_closed_doors
+from embodied.tasks.find import FindConfig, find_pool, find_task
+
+SHARE = 0.5
+"""Share of the doors that are closed at the start."""
+CONFIG = FindConfig(kind="doors", horizon=60)
+
+
+def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
+    pool = find_pool(inputs.world, seed=inputs.seed, config=CONFIG)
+
+    def task(i: int) -> Task:
+        plain = find_task(pool, i, seed=inputs.seed, language=inputs.language, config=CONFIG)
+        return with_closed_doors(plain, inputs.world, SHARE, seed=inputs.seed)
+
+    return parts_of_pool(len(pool), task, parts)
+
+
+def environments(inputs: EnvInputs) -> EnvMaker:
+    """A maker of environments.
+
+    Raises:
+      ValueError: rules that are no value of DoorRule.
+    """
+    moves, known = PanoramicMoves(), {r.value: r for r in DoorRule}
+    if inputs.rules not in known:
+        raise ValueError(f"rules of 'doors' should be one of {sorted(known)}, got {inputs.rules!r}")
+
+    def make() -> HelpEnv:
+        env = HelpEnv(inputs.worlds, moves=moves)
+        env.doors = known[inputs.rules]
+        return env
+
+    return make
+
+
+def opened(episode: Episode, graph: NavGraph) -> float:
+    """Doors that the agent opened, how ever."""
+    return float(
+        sum(
+            len(m)
+            for (_, m), s in zip(doors_in(episode, graph), episode.steps)
+            if m and not isinstance(s.action, Close)
+        )
+    )
+
+
+def needed(episode: Episode, graph: NavGraph) -> float:
+    """1 if no goal can be reached without opening a door."""
+    closed = graph.closed.union(episode.task.closed)
+    ways = behind_doors(graph, closed, float("inf")).distance[episode.task.start.node]
+    return float(all(ways[g] == float("inf") for g in episode.task.goal_nodes))
+
+
+def success_behind(episode: Episode, graph: NavGraph) -> float:
+    """Success where a door had to be opened, else 0."""
+    return success(episode, graph) * needed(episode, graph)
+
+
+DOORS_KIND = register_kind(
+    TaskKind(
+        name="doors",
+        title="Doors",
+        tasks=tasks,
+        environment=environments,
+        rules=DoorRule.OPEN.value,
+        baselines={
+            "random": RandomOpener,
+            "never opens": NeverOpens,
+            "shortest": Shortest,
+            "wanderer, blind": functools.partial(Wanderer, None),
+        },
+        looking={"wanderer": Wanderer, "wanderer, never opens": functools.partial(Wanderer, opens=False)},
+        needs_stop=True,
+        metrics={
+            "success behind doors": Metric(success_behind, percent=True, per=needed),
+            "doors opened": Metric(opened),
+        },
+        columns=("success", "success behind doors", "spl", "navigation error", "doors opened", "steps"),
+        opens_doors=True,
+        story=StoryStyle(dialogue=False),
+    )
+)
