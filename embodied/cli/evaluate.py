@@ -67,7 +67,8 @@ class TaskOptions:
     """Play N episodes at a time, which does not change results (default: 32 for trained agents, else 8)."""
     rules: Annotated[str | None, Option(metavar="WORD")] = None
     """Rules of play of the kind of task. vnla: help in words (indirect, the default), the advisor acts and says it
-    (direct) or does not (direct-mute), Algorithm 6 as printed (algorithm-6)."""
+    (direct) or does not (direct-mute), Algorithm 6 as printed (algorithm-6). doors: a move towards a closed door is
+    masked (open, the default), opens it (push), or opens it and goes through (walk)."""
     seed_file: InputPath | None = None
     """Without --data: seeds of the houses to play in, one per line."""
     part: Annotated[str | None, Option(metavar="NAME")] = None
@@ -97,7 +98,7 @@ class OfTrained:
 @dataclass(frozen=True, kw_only=True)
 class EvaluateOptions(TaskOptions, Results, OfTrained, WithModel, Encoded, Threaded, Furnished):
     kind: Annotated[str, Option(metavar="KIND", name="kind")]
-    """The kind of task: find, vln, vnla, hanna, hari, ask, or MODULE:NAME of your own."""
+    """The kind of task: find, vln, vnla, hanna, hari, ask, doors, or MODULE:NAME of your own."""
     agent: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
     """Agents to evaluate: baselines by name, 'shipped', a file or run folder of `embodied train`, 'llm', MODULE:CLASS
     of your own policy, MODULE:LEARNER=RUN of your own learner, a folder with an agent.py, or the http:// address

@@ -1,4 +1,6 @@
-"""Gymnasium environments embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0, Ask-v0, registered by `import embodied`.
+"""Gymnasium environments embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0, Ask-v0, Doors-v0.
+
+They are registered by `import embodied`.
 
     env = gymnasium.make("embodied/HANNA-v0", data="DIR", split="train", observations=("rgb", "depth"))
     envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=64, data="DIR")
