@@ -34,6 +34,11 @@ def closed_doors(house: House, threshold: float = OPEN_FROM) -> frozenset[str]:
     return frozenset(o.id for o in _room_doors(house) if o.angle < threshold * WIDEST)
 
 
+def opened(house: House, threshold: float = OPEN_FROM) -> House:
+    """The house with its closed doors wide open."""
+    return with_doors(house, dict.fromkeys(sorted(closed_doors(house, threshold)), 1.0))
+
+
 def with_doors(house: House, openness: Mapping[str, float]) -> House:
     """The house with some doors at another openness; itself without any."""
     turned = [dataclasses.replace(o, angle=openness[o.id] * WIDEST) if o.id in openness else o for o in house.openings]

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from embodied.house.house import DOORS, House, HouseError, Room
-from embodied.navigation.doors import OPEN_FROM, closed_doors, doors_of_edges, with_doors
+from embodied.navigation.doors import OPEN_FROM, closed_doors, doors_of_edges, opened
 from embodied.navigation.free_space import EYE, free_floor, sight_floor
 
 AGENT_RADIUS = 0.2
@@ -179,7 +179,7 @@ def build_graph(house: House, *, spacing: float = 2.25, open_from: float = OPEN_
     Examples:
       >>> graph = embodied.build_graph(house)
     """
-    rest, house = house, with_doors(house, dict.fromkeys(sorted(closed_doors(house, open_from)), 1.0))
+    rest, house = house, opened(house, open_from)
     positions: list[tuple[float, float, float]] = []
     rooms: list[str] = []
     edges: list[tuple[int, int]] = []
@@ -216,8 +216,8 @@ def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list
 
 
 def unreachable_rooms(house: House) -> tuple[str, ...]:
-    """Ids of rooms that a body of the agent's radius cannot enter from the rest of their storey."""
-    closed = []
+    """Ids of rooms that a body of the agent's radius cannot enter from the rest of their storey, all doors open."""
+    house, closed = opened(house), []
     for storey in range(len(house.storeys)):
         rooms = [r for r in house.rooms if r.storey == storey]
         _, room_of_cell, reach = reachable(house, storey)
