@@ -20,6 +20,7 @@ from embodied.house.house import House
 from embodied.house.lighting import load_lit_house
 from embodied.house.moment import Moment, RigidPose
 from embodied.interface import Sighting
+from embodied.navigation.doors import OPEN_FROM
 from embodied.navigation.graph import NavGraph, build_graph
 from embodied.navigation.poses import FreePoses
 from embodied.render.camera import View
@@ -200,7 +201,11 @@ class World:
         if not state:
             return self
         if state not in self._states:
-            made_of = self.catalogue, self.graph, self.cache, self.pictures
+            closed = self.graph.closed.union(d for d, x in state if x < OPEN_FROM).difference(
+                d for d, x in state if x >= OPEN_FROM
+            )
+            graph = dataclasses.replace(self.graph, closed=closed)
+            made_of = self.catalogue, graph, self.cache, self.pictures
             moment = Moment(openness=dict(state))
             if self.pictures.quality is None:
                 world = type(self)(moment.applied(self.house), *made_of)

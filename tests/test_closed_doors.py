@@ -11,12 +11,15 @@ from handmade import HandCatalogue, furnished
 
 from embodied.envs.base import ActionError, DoorRule, HelpEnv
 from embodied.evaluation.rollout import play
-from embodied.interface import Close, Episode, FindObject, Move, Open, Pose, Stop, Task, viewpoint
+from embodied.interface import Close, Episode, FindObject, FollowRoute, Move, Open, Pose, Stop, Task, viewpoint
 from embodied.kinds import metrics
 from embodied.kinds.task_kind import EnvInputs, kind_named
+from embodied.language.people_language import People
 from embodied.navigation.doors import place_named, with_doors
 from embodied.navigation.graph import OPENING, behind_doors, build_graph
+from embodied.policies.listeners import ScriptedListener
 from embodied.records import from_json, to_json
+from embodied.tasks.doors import told_of_doors
 from embodied.world import World
 
 HOUSE = furnished(two_rooms())
@@ -67,7 +70,7 @@ def test_only_the_agent_that_opens_doors_arrives_and_spl_counts_the_opening(worl
 def test_a_door_bars_the_way_until_it_is_opened_and_again_when_it_is_closed(world, task):
     env = HelpEnv({HOUSE.name: world})
     o = env.reset(task)
-    graph, (door,) = world.graph, task.closed
+    graph = world.graph
     way = behind_doors(graph, env.closed).path(task.start.node, task.goal_nodes[0])
     while not graph.barred(env.pose.node, following(way, env), env.closed):
         o = env.step(Move(env.situation.candidate_nodes.index(following(way, env))))
@@ -106,3 +109,15 @@ def test_agents_that_know_no_doors_arrive_under_other_rules(world, task, rule):
     assert metrics.success(episode, world.graph) == 1
     assert metrics.path_length(episode, world.graph) > world.graph.distance[episode.nodes[0], episode.nodes[-1]] + 0.5
     assert any(isinstance(s.action, Open) for s in episode.steps) == (DoorRule(rule) is DoorRule.PUSH)
+
+
+def test_whoever_is_told_to_open_doors_arrives(world, task):
+    graph, people = world.graph, People()
+    path = graph.path(task.start.node, task.goal_nodes[0])
+    route = dataclasses.replace(task, kind="vln", goal=FollowRoute("r", path), radius=3.0)
+    for seed in range(8):
+        told = told_of_doors(route, world, people, seed=seed)
+        assert " door" in told.request
+        listener = ScriptedListener({HOUSE.name: world})
+        (episode,) = play(lambda: HelpEnv({HOUSE.name: world}), listener, [told], seed=0)
+        assert metrics.success(episode, graph) == 1 and any(isinstance(s.action, Open) for s in episode.steps)

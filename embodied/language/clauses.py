@@ -55,6 +55,14 @@ class Enter(OfRoom):
     """Through which of the doors on that side, counted along the way from 1; 0 where nobody counts."""
 
 
+@dataclass(frozen=True)
+class OpenDoor(OfRoom):
+    """Open a closed door and walk into the room behind it."""
+
+    side: str | None = None
+    """LEFT or RIGHT of the way walked, where one turns to it."""
+
+
 class Cross(OfRoom):
     """Walk on through the room one is in."""
 
@@ -104,7 +112,9 @@ class StopHere:
     """The end is where the last clause ended."""
 
 
-Clause = Turn | Exit | Enter | Cross | Forward | Metres | To | Past | Avoid | Notice | StopBy | StopIn | StopHere
+Clause = (
+    Turn | Exit | Enter | OpenDoor | Cross | Forward | Metres | To | Past | Avoid | Notice | StopBy | StopIn | StopHere
+)
 STOPS = (StopBy, StopIn, StopHere)
 REMARKS = (Avoid, Notice)
 """Clauses that ask for nothing to be done."""
@@ -117,7 +127,7 @@ def room_of(clause: Clause) -> str | None:
 
 def side_of(clause: Clause) -> str | None:
     """LEFT or RIGHT where a clause names a side."""
-    return clause.side if isinstance(clause, Turn | Enter | Past) else None
+    return clause.side if isinstance(clause, Turn | Enter | OpenDoor | Past) else None
 
 
 @dataclass(frozen=True)

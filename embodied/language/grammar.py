@@ -19,6 +19,7 @@ from embodied.language.clauses import (
     Metres,
     OfRoom,
     OfThing,
+    OpenDoor,
     Past,
     Referent,
     RouteInstruction,
@@ -51,6 +52,8 @@ def kind_of(clause: Clause) -> str:
         return "past" if clause.side is None else "past_side"
     if isinstance(clause, Enter):
         return "door" if clause.nth else "enter"
+    if isinstance(clause, OpenDoor) and clause.side:
+        return "open_door_side"
     return _NAMES[type(clause)]
 
 
@@ -110,7 +113,7 @@ def _again(phrases: Sequence[Phrase]) -> list[str]:
         kind = room_of(p.clause)
         same = kind == here and isinstance(p.clause, Enter)
         befores.append(("next " if kind in PASSAGES else "other ") if same else "")
-        here = kind if isinstance(p.clause, Enter | Exit | Cross) else here
+        here = kind if isinstance(p.clause, Enter | OpenDoor | Exit | Cross) else here
     return befores
 
 
@@ -192,7 +195,9 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
     return " ".join(s[0].upper() + s[1:] + "." for s in sentences)
 
 
-ARRIVING = frozenset({"exit", "enter", "door", "cross", "forward", "metres", "to", "past", "past_side"})
+ARRIVING = frozenset(
+    {"exit", "enter", "door", "open_door", "open_door_side", "cross", "forward", "metres", "to", "past", "past_side"}
+)
 """Clauses that lead somewhere, so that 'once there' may follow."""
 _SUBJECTS = re.compile(r"(you|you'll|your|that|that's|this|if|I|the|not|bingo|done|end)\b")
 
@@ -346,6 +351,8 @@ def _made(name: str, slots: Mapping[str, str], rooms: Iterator[str], thing: Refe
         return Turn(LEFT, 180)
     if name == "door":
         return Enter(next(rooms), slots["side"], SPOKEN.ordinals.index(slots["nth"]))
+    if name == "open_door_side":
+        return OpenDoor(next(rooms), slots["side"])
     if name == "metres":
         n = slots["n"]
         return Metres(SPOKEN.numbers.index(n) if n in SPOKEN.numbers else int(n))

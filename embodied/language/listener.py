@@ -25,6 +25,7 @@ from embodied.language.clauses import (
     Enter,
     Exit,
     Metres,
+    OpenDoor,
     Past,
     Referent,
     RouteInstruction,
@@ -43,6 +44,8 @@ MOST_WALKS = 2500
 """Most partial walks it thinks through before it settles for the best it has."""
 ARRIVAL_DISTANCE, PASSING_DISTANCE = 1.6, 2.6
 """Metres within which one is at a thing, or passes it."""
+UNASKED = 1.0
+"""Cost of opening a door that nobody spoke of."""
 MISSING = 4.0
 """Cost of a thing or room that is not there."""
 
@@ -142,8 +145,10 @@ def _onward(eyes: Lookout, clause: Clause, walk: _Walk) -> Iterator[tuple[float,
     if steps < STEPS_PER_CLAUSE:
         for way in eyes.at(path[-1]).ways:
             added = _step_cost(clause, way, walk) + 1.5 * (way.node in path)
-            if way.leaves and not isinstance(clause, Exit | Enter):
+            if way.leaves and not isinstance(clause, Exit | Enter | OpenDoor):
                 added += 0.4 * (not isinstance(clause, Cross))
+            if way.closed and not isinstance(clause, OpenDoor):
+                added += UNASKED
             left = 0.0 if steps else pending
             yield added, dataclasses.replace(walk, path=(*path, way.node), facing=way.yaw, pending=left)
 
@@ -152,6 +157,8 @@ def _step_cost(clause: Clause, way: Way, walk: _Walk) -> float:
     """Of one step in itself: turns that were not asked for, but for the one into a counted door."""
     turned = float(wrap(way.yaw - walk.facing))
     if way.leaves and isinstance(clause, Enter) and clause.nth and (turned > 0) == (clause.side == LEFT):
+        return 0.12
+    if way.closed and isinstance(clause, OpenDoor) and clause.side and (turned > 0) == (clause.side == LEFT):
         return 0.12
     wanted = walk.pending if walk.steps == 0 else 0.0
     return 0.12 + turn_cost(turned, wanted, asked=walk.steps == 0 and walk.pending != 0.0)
@@ -176,6 +183,9 @@ def walk_cost(clause: Clause, eyes: Lookout, path: Sequence[int]) -> float:
             + MISSING * (not (crossings and crossings[-1]))
             + 0.8 * (sum(crossings) > 1)
         )
+    if isinstance(clause, OpenDoor):
+        opened = [_way(eyes.at(a), b).closed for a, b in itertools.pairwise(path)]
+        return MISSING * (last.kind != clause.kind) + MISSING * (opened[-1:] != [True]) + 0.8 * (sum(crossings) > 1)
     if isinstance(clause, Cross):
         kinds = [eyes.at(n).kind for n in path]
         return 1.5 * (clause.kind not in kinds) + 0.7 * sum(k != clause.kind for k in kinds[1:])

@@ -32,6 +32,8 @@ class PlainLanguage:
             words = turn_words(float(wrap(direction - yaw)))
             if room != world.graph.room_of_node[a]:
                 kind = world.house.room_by_id[room].kind
+                if world.graph.barred(a, b, world.graph.closed):
+                    words += " . open the door and go"
                 words += f" into the {kind.replace('_', ' ')}"
             parts.append(words)
             yaw = direction

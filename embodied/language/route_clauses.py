@@ -22,6 +22,7 @@ from embodied.language.clauses import (
     Forward,
     Metres,
     Notice,
+    OpenDoor,
     Past,
     Referent,
     StopBy,
@@ -106,7 +107,13 @@ def plan(
     legs = legs_of(world, path, yaw)
     for n, leg in enumerate(legs):
         phrases += _turn(leg.turn)
-        if leg.crosses:
+        if leg.crosses and world.graph.barred(leg.nodes[-2], leg.nodes[-1], world.graph.closed):
+            beside = len(leg.nodes) == 2 and SLIGHT <= abs(leg.turn) < BACK
+            if beside:
+                phrases.pop()
+            side = (LEFT if leg.turn > 0 else RIGHT) if beside else None
+            phrases.append(Phrase(OpenDoor(telling.kind(leg.nodes[-1]), side)))
+        elif leg.crosses:
             crossing = _crossing(telling, leg, first=n == 0)
             walked = [*itertools.chain.from_iterable(earlier.nodes[:-1] for earlier in legs[:n]), *leg.nodes]
             if telling.chance(speaker.counts) and (counted := _counted(telling.eyes, walked, crossing)):

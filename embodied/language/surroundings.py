@@ -50,6 +50,8 @@ class Way:
     """It leads into another room."""
     door: str | None = None
     """The doorway it goes through; tells two apart."""
+    closed: bool = False
+    """A closed door bars it."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,7 @@ def look(world: SeenPlace, node: int) -> Surroundings:
                 kind=house.room_by_id[other].kind,
                 leaves=other != room,
                 door=min(between)[1] if between else None,
+                closed=bool(graph.barred(node, n, graph.closed)),
             )
         )
     seen_doors = tuple(Door(name, (float(at[0] - here[0]), float(at[1] - here[1]))) for name, _, at in doors)

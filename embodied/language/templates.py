@@ -17,7 +17,8 @@ from embodied.assets.json_file import from_plain, read_toml
 @dataclass(frozen=True)
 class Template:
     kinds: tuple[str, ...]
-    """Clause kinds in order: 'turn', 'slight', 'around', 'exit', 'enter', 'door', 'cross', 'forward', 'metres', 'to',
+    """Clause kinds in order: 'turn', 'slight', 'around', 'exit', 'enter', 'door', 'open_door',
+    'open_door_side', 'cross', 'forward', 'metres', 'to',
     'past', 'past_side', 'avoid', 'notice', 'stop_by', 'stop_in', 'stop_here'."""
     text: str
     habit: str = ""

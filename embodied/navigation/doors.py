@@ -77,16 +77,17 @@ def seen_name(house: House, graph: NavGraph, node: int, closed: Collection[str])
     A closed door hides what is behind it, so of the doors that differ from the house at rest only those count that
     a way without opening leads to. Two windows that face each other are not looked through.
     """
-    rest = graph.closed
-    if rest == closed:
+    changed = changed_doors(graph, closed)
+    if not changed:
         return house.name
     rooms = _rooms_within(house, graph, graph.room_of_node[node], closed)
-    differ = [
-        f"{o.id}={int(o.id not in closed)}"
-        for o in _room_doors(house)
-        if (o.id in rest) != (o.id in closed) and rooms.intersection(o.rooms)
-    ]
-    return house.name + MARK + ",".join(differ) if differ else house.name
+    beside = [o.id for o in _room_doors(house) if o.id in changed and rooms.intersection(o.rooms)]
+    return house.name + MARK + ",".join(f"{d}={changed[d]:g}" for d in beside) if beside else house.name
+
+
+def changed_doors(graph: NavGraph, closed: Collection[str]) -> dict[str, float]:
+    """Openness, 0 or 1, of the doors that differ from the house at rest while some doors are closed."""
+    return {d: float(d not in closed) for d in sorted(graph.closed.symmetric_difference(closed))}
 
 
 def parse_seen(name: str) -> tuple[str, dict[str, float]]:

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from embodied.interface import Action, Mode, Move, Observation, SeenPlace, Situation, Stop
+from embodied.interface import Action, Mode, Move, Observation, Open, SeenPlace, Situation, Stop
 from embodied.language import follow
+from embodied.navigation.doors import changed_doors
 from embodied.policies.baselines import PerEpisodePolicy, PerfectInterpreter
 
 
@@ -26,13 +27,18 @@ class HeardRoute:
     """Still to walk, the current one first."""
 
     def step(self, world: SeenPlace, o: Observation, s: Situation) -> Action:
-        """The next step of what the text says; stop at its end."""
+        """The next step of what the text says, opening doors on the way; stop at its end."""
+        if doors := changed_doors(s.world.graph, s.closed):
+            world = world.with_doors(doors)
         if self.heard != o.instruction or o.time_on_task == 0:
             self.heard, self.nodes = o.instruction, follow(world, o.instruction, s.pose.node, s.pose.yaw).path
         if len(self.nodes) < 2:
             return Stop()
+        chosen = s.candidate_nodes.index(self.nodes[1])
+        if chosen in o.can_open:
+            return Open(chosen)
         self.nodes = self.nodes[1:]
-        return Move(s.candidate_nodes.index(self.nodes[0]))
+        return Move(chosen)
 
 
 class ScriptedListener(PerEpisodePolicy):
