@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 PANORAMAS_KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
-STATES_KEPT = 16
+STATES_KEPT = 4
 """Worlds with other doors closed that are held open, each with a renderer once it is drawn."""
 SLACK = 0.05
 """Metres (and three times as many radians) that a body goes until its light is computed anew."""
@@ -91,6 +91,7 @@ class World:
         self._moving: MovingHouse | None = None
         self._bodies: dict[str, tuple[Part, ...]] = {}
         self._followed: mujoco.MjModel | None = None
+        self._lender: World | None = None
         self._states: dict[tuple[tuple[str, float], ...], Self] = {}
         self._recent = functools.lru_cache(maxsize=PANORAMAS_KEPT)(self._load)
 
@@ -209,6 +210,7 @@ class World:
             moment = Moment(openness=dict(state))
             if self.pictures.quality is None:
                 world = type(self)(moment.applied(self.house), *made_of)
+                world._lender = self
             else:
                 world = type(self)(self.house, *made_of)
                 world._bake = self.baked()
@@ -333,11 +335,18 @@ class World:
     @property
     def renderer(self) -> Renderer:
         """The renderer of this world, for pictures from anywhere; opened on first use."""
+        if self._lender is not None:
+            shared = self._lender.renderer
+            shared.turn(self.house)
+            return shared
         if self._renderer is None:
             overlay = gloss_of(self.baked()) if _reflects(self.pictures) else None
             house = self.house if self.pictures.quality else self.moment.applied(self.house)
             lit = self.baked().lit if self.pictures.quality else None
             self._renderer = Renderer(house, self.catalogue, size=self.pictures.size, lit=lit, overlay=overlay)
+            self._drawn = house
+        if self.pictures.quality is None:
+            self._renderer.turn(self._drawn)  # another world may have turned its doors
         return self._renderer
 
     def baked(self, progress: bool = False) -> Bake:

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import torch
 
 from embodied.gym.semantic_features import SightRows
-from embodied.interface import Sight, is_picture
+from embodied.interface import VIEWS, Sight, Viewpoint, is_picture, viewpoint
 
 
 class FeatureBank:
     """A FeatureSource over (36, D) feature sets that are already computed, as one tensor on a device."""
 
-    def __init__(self, worlds: Mapping[str, np.ndarray], digest: str) -> None:
+    def __init__(
+        self, worlds: Mapping[str, np.ndarray], digest: str, live: Callable[[Sight], np.ndarray] | None = None
+    ) -> None:
         """Args:
           worlds: world name -> (nodes, 36, D) features, float16 or float32.
           digest: of the encoder that agents must have learned from to be shown them.
+          live: makes those (36, D) of a house with other doors closed, when they are first asked for.
 
         Raises:
           ValueError: another shape, or no world.
@@ -25,6 +28,7 @@ class FeatureBank:
         self._rows = SightRows(worlds)
         self._table = torch.from_numpy(self._rows.filled(worlds))
         self._shown: int | None = None
+        self._live, self._other_doors = live, dict[Viewpoint, int]()
         self.size, self.digest = self._rows.size, digest
 
     def to(self, device: torch.device | str) -> FeatureBank:
@@ -41,7 +45,8 @@ class FeatureBank:
 
     def blind(self) -> FeatureBank:
         """The bank in which everything is black: all features are zero."""
-        return self._with(_table=torch.zeros_like(self._table))
+        nothing = np.zeros((VIEWS, self.size), np.float32)
+        return self._with(_table=torch.zeros_like(self._table), _live=lambda sight: nothing, _other_doors={})
 
     def features(self, sight: Sight) -> np.ndarray:
         """(36, D) float32, in absolute order."""
@@ -64,6 +69,13 @@ class FeatureBank:
         return other
 
     def _row(self, sight: Sight) -> int:
+        at = viewpoint(sight)
+        if at.world not in self._rows.spans and self._live is not None:
+            if at not in self._other_doors:
+                self._other_doors[at] = len(self._table)
+                made = torch.from_numpy(self._live(sight)).to(self._table)
+                self._table = torch.cat([self._table, made[None]])
+            return self._other_doors[at]
         row = self._rows.row(sight)
         if self._shown is not None and is_picture(sight):
             return row + self._shown

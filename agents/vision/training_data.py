@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,12 +17,14 @@ from embodied.agents.learner import PlaySettings
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.capture import house_features
 from embodied.agents.vision.config import SAME_TIME
-from embodied.agents.vision.drawn import drawings_of
+from embodied.agents.vision.drawn import drawings_of, drawn_world, pictures_of
 from embodied.agents.vision.encoder import Encoder, load_encoder
+from embodied.agents.vision.live import LiveFeatures
 from embodied.assets.cache import default_cache
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import spread
+from embodied.gym.sensors import PanoramaStore
 
 A = TypeVar("A", bound=About)
 
@@ -61,10 +63,17 @@ class TrainingData:
         split = data.split(name, houses=houses, rules=rules)
         tasks = split.tasks if limit is None else spread(split.tasks, limit)
         features = functools.partial(house_features, data, list(split.worlds), encoder, kind, self.cache)
-        bank = FeatureBank(features(), encoder).to(self.device)
+        live = functools.cache(functools.partial(self._live, list(split.worlds)))
+        bank = FeatureBank(features(), encoder, lambda sight: live().features(sight)).to(self.device)
         if self.goal_image != SAME_TIME:
             bank = bank.with_goal_images(features(self.goal_image))
         return Split(split.worlds, tasks, split.make_env, bank)
+
+    def _live(self, names: Sequence[str]) -> LiveFeatures:
+        """Features of houses as their doors are."""
+        pictures = {n: pictures_of(self.data, n, self.picture_kind) for n in names}
+        worlds = {n: drawn_world(self.data, n, self.cache, pictures[n]) for n in names}
+        return LiveFeatures(self.encoder, PanoramaStore(worlds))
 
     def rewording(self, config: ImitationSettings) -> Callable[[str], str] | None:
         """A function that says the texts of training in other words, if the settings want it."""

@@ -43,6 +43,7 @@ FEW_TASKS = 20
 """How many tasks a language model plays, or anybody in a generated house, unless --tasks says otherwise."""
 SEEDED_AREA = (90.0, 140.0)
 """Size of the houses of --seed-file, square metres."""
+DOOR_RULES = ("open", "push", "walk")
 MODEL_SEES = ("names", "strip", "panorama", "nothing")
 
 
@@ -67,8 +68,12 @@ class TaskOptions:
     """Play N episodes at a time, which does not change results (default: 32 for trained agents, else 8)."""
     rules: Annotated[str | None, Option(metavar="WORD")] = None
     """Rules of play of the kind of task. vnla: help in words (indirect, the default), the advisor acts and says it
-    (direct) or does not (direct-mute), Algorithm 6 as printed (algorithm-6). doors: a move towards a closed door is
-    masked (open, the default), opens it (push), or opens it and goes through (walk)."""
+    (direct) or does not (direct-mute), Algorithm 6 as printed (algorithm-6)."""
+    closed_doors: float = 0.0
+    """Close this share of the doors at the start of every task, besides those that its kind closes."""
+    doors: Annotated[str, Option(words=DOOR_RULES)] = DOOR_RULES[0]
+    """Effect of a move towards a closed door. open: none, the agent has to open it first; push: it opens the door;
+    walk: it opens the door and goes through, for agents that know no doors."""
     seed_file: InputPath | None = None
     """Without --data: seeds of the houses to play in, one per line."""
     part: Annotated[str | None, Option(metavar="NAME")] = None
@@ -135,18 +140,26 @@ class Evaluation:
     """Split and agent to how many of the routes that it was told a scripted listener arrives with, and how many."""
 
     def changed(self, split: SplitData) -> SplitData:
-        """The split with this assistant and with episodes of at most --steps."""
+        """The split with this assistant, these doors and episodes of at most --steps."""
+        from embodied.envs.base import DoorRule
+        from embodied.tasks.doors import with_closed_doors
+
         if steps := self.args.steps:
             tasks = tuple(dataclasses.replace(t, horizon=min(t.horizon, steps)) for t in split.tasks)
             split = dataclasses.replace(split, tasks=tasks)
+        if share := self.args.closed_doors:
+            shut = (with_closed_doors(t, split.worlds[t.world], share, seed=self.args.seed) for t in split.tasks)
+            split = dataclasses.replace(split, tasks=tuple(shut))
 
         def make_env() -> HelpEnv:
             env = split.make_env()
-            if env.assistant is not None:
+            env.doors = DoorRule(self.args.doors)
+            if env.assistant is not None and self.args.assistant != TEMPLATE:
                 env.assistant = self.reword(env.assistant)
             return env
 
-        return split if self.args.assistant == TEMPLATE else dataclasses.replace(split, make_env=make_env)
+        usual = self.args.assistant == TEMPLATE and self.args.doors == DoorRule.OPEN.value
+        return split if usual else dataclasses.replace(split, make_env=make_env)
 
     def keep(self, split: str, name: str, episodes: Sequence[Episode]) -> None:
         """Save episodes into --out."""
@@ -395,7 +408,12 @@ def write(evaluation: Evaluation) -> None:
     digest, agents = evaluation.data and evaluation.data.digest, [*evaluation.agents.values()]
     if args.out:
         about: dict[str, object] = {"data": digest, "seed": args.seed, "tasks": args.tasks, "agents": agents}
-        about |= {"splits": evaluation.splits, "rules": args.rules, "assistant": args.assistant}
+        about |= {
+            "splits": evaluation.splits,
+            "rules": args.rules,
+            "doors": [args.closed_doors, args.doors],
+            "assistant": args.assistant,
+        }
         tables.save(rows, args.out, "table")
         write_json(args.out / "run.json", fingerprint(**{**about, **evaluation.facts}), indent=1)
         note(f"table and episodes in {args.out}")

@@ -54,7 +54,7 @@ class ActionError(ValueError):
     """An action that is not possible now; the episode is unchanged and can go on."""
 
 
-class DoorRule(enum.Enum):
+class DoorRule(enum.StrEnum):
     """Effects of a move towards a closed door."""
 
     OPEN = "open"

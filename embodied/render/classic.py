@@ -25,6 +25,7 @@ from embodied.render.panorama import Panorama
 from embodied.render.pictures import check_size
 from embodied.render.supersampling import averaged, drawn_size
 from embodied.scene.house_meshes import house_parts, owners
+from embodied.scene.joinery import leaf_poses
 from embodied.scene.lit_pages import ANYWHERE, LitMesh, LitPages
 from embodied.scene.model import compile_scene, drawn_meshes, give_memory_back
 from embodied.scene.part import Part
@@ -92,6 +93,7 @@ class Renderer:
 
         check_size(size)
         self.house, self.size = house, size
+        self._made_of, self._finish = house, catalogue.finish
         self._drawing: Geoms | Raster | None = None
         self._overlay = overlay
         self._software = gl.info().software
@@ -158,6 +160,22 @@ class Renderer:
             drawing.repaint(page, (row, column), picture)  # type: ignore[union-attr]
         if self._overlay is not None:
             self._overlay.change(corners, patches)
+
+    @gl.drawing()
+    def turn(self, house: House) -> None:
+        """Draw doors as `house` has them, which differs in nothing else from that which this was made for; not where a
+        house is lit (`World.show` moves its doors)."""
+        if house is self.house:
+            return
+        drawing, turns = self._open(), dict[str, tuple[np.ndarray, float]]()
+        assert isinstance(drawing, Geoms), "drawn with its materials"
+        for then, now in zip(self._made_of.openings, house.openings, strict=True):
+            if then.angle != now.angle:
+                after = leaf_poses(house, now, self._finish)
+                for name, (pivot, yaw) in leaf_poses(self._made_of, then, self._finish).items():
+                    turns[name] = np.array(pivot), after[name][1] - yaw
+        drawing.turn(turns)
+        self.house = house
 
     def view(
         self,

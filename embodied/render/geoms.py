@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from embodied import gl
 
@@ -12,6 +13,7 @@ import cv2
 import mujoco
 import numpy as np
 
+from embodied.geometry import rotation
 from embodied.render.camera import FAR_PLANE, NEAR_PLANE, Camera
 from embodied.scene.model import VISUAL, Scene
 
@@ -47,6 +49,22 @@ class Geoms:
         self._option.geomgroup[VISUAL] = 1
         self._camera, self._perturb = mujoco.MjvCamera(), mujoco.MjvPerturb()
         self._groups = model.geom_group.copy()
+        self.middles, self.reaches = world_boxes(model, self._data)
+        self._rest = model.geom_pos.copy(), model.geom_quat.copy()
+
+    def turn(self, turns: Mapping[str, tuple[np.ndarray, float]]) -> None:
+        """Turn geoms about vertical axes from where they were at first; those that are not named go back there.
+
+        Args:
+          turns: by geom, (3,) a point of the axis, metres, world, and radians counter-clockwise.
+        """
+        model = self._scene.model
+        model.geom_pos[:], model.geom_quat[:] = self._rest
+        for name, (pivot, angle) in turns.items():
+            geom = model.geom(name)
+            geom.pos[:2] = pivot[:2] + rotation(angle) @ (geom.pos[:2] - pivot[:2])
+            mujoco.mju_mulQuat(geom.quat, [math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)], geom.quat.copy())
+        mujoco.mj_kinematics(model, self._data)
         self.middles, self.reaches = world_boxes(model, self._data)
 
     def rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> np.ndarray:

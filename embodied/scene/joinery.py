@@ -289,6 +289,18 @@ def _leaves(house: House, hole: _Hole, wood: Finish) -> list[Part]:
     return parts
 
 
+def leaf_poses(
+    house: House, opening: Opening, finish: Callable[[str], Finish]
+) -> dict[str, tuple[tuple[float, float, float], float]]:
+    """Hinges, metres, and yaws, radians, of the parts of a door's leaves, by name of the geom that draws them."""
+    poses, count = {}, dict[str, int]()
+    for p in opening_parts(house, opening, finish):
+        k = count[p.owner] = count.get(p.owner, -1) + 1
+        if p.mesh_key.startswith("leaf/"):
+            poses[f"{p.owner}#{k}"] = p.position, p.yaw
+    return poses
+
+
 def _leaf(width: float, height: float, thick: float, style: str) -> tuple[Shape, Shape | None]:
     """A leaf from its hinge at x = 0, its room side at y = 0: stiles, rails and recessed panels or a pane."""
     if style == "flat":

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import functools
 
-from embodied.action_spaces import PanoramicMoves, doors_in
-from embodied.envs.base import DoorRule, HelpEnv
+from embodied.action_spaces import doors_in
 from embodied.interface import Close, Episode, Task
 from embodied.kinds.metrics import success
 from embodied.kinds.task_kind import (
-    EnvInputs,
-    EnvMaker,
     Metric,
     Parts,
     PartTasks,
@@ -41,24 +38,6 @@ def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
     return parts_of_pool(len(pool), task, parts)
 
 
-def environments(inputs: EnvInputs) -> EnvMaker:
-    """A maker of environments.
-
-    Raises:
-      ValueError: rules that are no value of DoorRule.
-    """
-    moves, known = PanoramicMoves(), {r.value: r for r in DoorRule}
-    if inputs.rules not in known:
-        raise ValueError(f"rules of 'doors' should be one of {sorted(known)}, got {inputs.rules!r}")
-
-    def make() -> HelpEnv:
-        env = HelpEnv(inputs.worlds, moves=moves)
-        env.doors = known[inputs.rules]
-        return env
-
-    return make
-
-
 def opened(episode: Episode, graph: NavGraph) -> float:
     """Doors that the agent opened, how ever."""
     return float(
@@ -87,8 +66,6 @@ DOORS_KIND = register_kind(
         name="doors",
         title="Doors",
         tasks=tasks,
-        environment=environments,
-        rules=DoorRule.OPEN.value,
         baselines={
             "random": RandomOpener,
             "never opens": NeverOpens,
