@@ -10,7 +10,9 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from embodied.assets.moving_parts import OPEN, openness_of
 from embodied.geometry import rotation
 from embodied.house.house import House, HouseError, Placement
 from embodied.house.shapes import room_at
@@ -59,6 +61,12 @@ class RigidPose:
         angle = 2 * math.acos(min(cos, 1.0)) if cos < 1 - 1e-12 else 0.0
         return max(math.dist(self.position, other.position), angle / 3)
 
+    def then(self, turn: np.ndarray, shift: np.ndarray) -> RigidPose:
+        """The pose of a part of the thing that is turned, (3, 3), and shifted, (3,) metres, in the thing's frame."""
+        x, y, z, w = Rotation.from_matrix(self.rotation @ turn).as_quat().tolist()
+        a, b, c = (self.rotation @ shift + self.position).tolist()
+        return RigidPose((a, b, c), (w, x, y, z))
+
     def points(self, local: np.ndarray) -> np.ndarray:
         """(n, 3) world metres of points (n, 3) of the thing's frame."""
         return local @ self.rotation.T.astype(local.dtype) + np.asarray(self.position, local.dtype)
@@ -76,7 +84,7 @@ class Moment:
     moved: Mapping[str, RigidPose] = field(default_factory=dict)
     """By placement id. What stands on a moved thing and is not named goes with it."""
     openness: Mapping[str, float] = field(default_factory=dict)
-    """By opening id: 0 is closed, 1 is open by WIDEST."""
+    """By opening id, or by placement id and part, 'wardrobe_1/left_door': 0 is closed, 1 is open, by WIDEST of doors."""
     bodies: Mapping[str, RigidPose] = field(default_factory=dict)
     """By name: things that are no part of the house, such as the links of a robot."""
 
@@ -92,14 +100,24 @@ class Moment:
           ValueError: it names what the house does not have, or an openness outside 0 to 1.
         """
         doors = {o.id for o in house.openings if o.leaf_finish is not None}
+        furniture = {o.partition("/")[0] for o in self.openness if "/" in o}
         for kind, names, known in (
-            ("things", self.moved, house.placement_by_id),
-            ("doors or windows", self.openness, doors),
+            ("things", {*self.moved, *furniture}, house.placement_by_id),
+            ("doors or windows", {o for o in self.openness if "/" not in o}, doors),
         ):
             if unknown := sorted(set(names) - set(known)):
                 raise ValueError(f"house {house.name!r} has no {kind} {unknown}; it has {sorted(known)[:8]} ...")
         if wrong := {o: x for o, x in self.openness.items() if not 0 <= x <= 1}:
             raise ValueError(f"openness should lie between 0 (closed) and 1 (open), got {wrong}")
+
+    def open_parts(self, house: House) -> dict[str, dict[str, float]]:
+        """How far parts of furniture are open that are not as the house has them, by placement id and part."""
+        out: dict[str, dict[str, float]] = {}
+        for name, openness in self.openness.items():
+            thing, slash, part = name.partition("/")
+            if slash and openness_of(house.placement_by_id[thing].params).get(part, 0.0) != openness:
+                out.setdefault(thing, {})[part] = openness
+        return out
 
     def poses(self, house: House) -> dict[str, RigidPose]:
         """RigidPose of every placement that is not where the house has it: the moved ones and what stands on them."""
@@ -127,7 +145,9 @@ class Moment:
         poses = self.poses(house)
         if leaning := sorted(i for i, pose in poses.items() if pose.rotation[2, 2] < 1 - UPRIGHT):
             raise ValueError(f"{leaning} lean; a house holds upright things only: give poses turned about z alone")
-        placements = [_placed(house, p, poses[p.id]) if p.id in poses else p for p in house.placements]
+        ajar = self.open_parts(house)
+        standing = (_opened(p, ajar[p.id]) if p.id in ajar else p for p in house.placements)
+        placements = [_placed(house, p, poses[p.id]) if p.id in poses else p for p in standing]
         openings = [
             dataclasses.replace(o, angle=self.openness[o.id] * WIDEST) if o.id in self.openness else o
             for o in house.openings
@@ -147,6 +167,11 @@ def carried(root: Placement, pose: RigidPose, p: Placement) -> RigidPose:
     quat = (w * cos - c * sin, a * cos + b * sin, b * cos - a * sin, c * cos + w * sin)
     at_x, at_y, at_z = pose.points(local[None])[0].tolist()
     return RigidPose((at_x, at_y, at_z), quat)
+
+
+def _opened(p: Placement, openness: Mapping[str, float]) -> Placement:
+    params = {**dict(p.params), **{OPEN + part: x for part, x in openness.items()}}
+    return dataclasses.replace(p, params=tuple(sorted((k, v) for k, v in params.items() if v or not k.startswith(OPEN))))
 
 
 def _placed(house: House, p: Placement, pose: RigidPose) -> Placement:

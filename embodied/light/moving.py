@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 
 from embodied.assets.catalogue import Catalogue
+from embodied.assets.moving_parts import FIXED, TakenApart, check_names, cut_open, openness_of
 from embodied.house.house import House
 from embodied.house.moment import WIDEST, Moment, RigidPose
 from embodied.house.shapes import room_at
@@ -46,7 +47,7 @@ from embodied.light.tracing.emitters import GLAZING, portals_of, read_lamps
 from embodied.light.tracing.rays import rays_among
 from embodied.light.tracing.sky import sun_direction, sun_height, sun_strength
 from embodied.render.gloss import GlossData
-from embodied.scene.house_meshes import object_parts
+from embodied.scene.house_meshes import apart, object_parts
 from embodied.scene.joinery import opening_parts
 from embodied.scene.lit_pages import ANYWHERE, LitMesh, LitPages
 from embodied.scene.part import Part
@@ -70,6 +71,8 @@ UNKNOWN_BELOW, KNOWN_FROM = 0.5, 0.92
 gone, and above which it says all."""
 BRIGHT = (0.3, 2.0)
 """Bounds of how bright what a thing hides is, beside the rest: nine harmonics are no more sure of one direction."""
+INSIDE = "/"
+"""End of the name of the inside of a thing that is open; before the name of a part of it stands the same."""
 AWAY = RigidPose((0.0, 0.0, -1e3))
 """Pose of a body that the moment does not have."""
 
@@ -141,7 +144,21 @@ class MovingHouse:
                     if p.mesh_key.startswith("leaf/"):
                         name = f"{o.id}@{'+' if '/+1' in p.mesh_key else '-'}"
                         out[name] = RigidPose.upright(p.position, p.yaw)
+        for thing, openness in moment.open_parts(self.house).items():
+            p = self.house.placement_by_id[thing]
+            if moment.carrier(self.house, p) is not None:
+                raise ValueError(f"{thing!r} was moved; its doors and drawers open where it stands at rest only")
+            whole, rest = self._apart(thing), RigidPose.upright(p.position, p.yaw)
+            check_names(p.object_class, whole, openness)
+            assert whole is not None
+            out[thing + INSIDE] = rest
+            for m in whole.moving:
+                if m.name in openness:
+                    out[f"{thing}/{m.name}"] = rest.then(*m.turn(openness[m.name]))
         return out | dict(moment.bodies)
+
+    def _apart(self, thing: str) -> TakenApart | None:
+        return apart(self.catalogue, self.house.placement_by_id[thing])
 
     def show(self, moment: Moment, *, slack: float = 0.0) -> SceneChange:
         """Bring everything to a moment.
@@ -184,6 +201,8 @@ class MovingHouse:
             return _Thing(self._surface(self._extra[name]), None, frozenset())
         if "@" in name:
             return self._leaf(*name.rsplit("@", 1))
+        if "/" in name:
+            return self._part(*name.split("/"))
         root = self.house.placement_by_id[name]
         carried = [p for p in self.house.placements if moment.carrier(self.house, p) == name]
         rest = RigidPose.upright(root.position, root.yaw)
@@ -207,6 +226,46 @@ class MovingHouse:
         rest = RigidPose.upright(parts[0].position, parts[0].yaw)
         owners = frozenset(p.owner for p in parts)
         return _Thing(self._surface([_in_frame(p, rest) for p in parts]), rest, owners)
+
+    def _part(self, thing: str, name: str) -> _Thing:
+        """A door or drawer of furniture, or its inside, which has no name."""
+        p, whole = self.house.placement_by_id[thing], self._apart(thing)
+        assert whole is not None, "checked by _wanted"
+        meshes = whole.parts[name] if name else whole.within
+        keys = [f"{p.asset}/{p.size}/{p.params}/{name}#{k}" for k in range(len(meshes))]
+        surface = self._surface([Part(p.id, "object", p.room, m, k) for m, k in zip(meshes, keys, strict=True)])
+        if not name:
+            return _Thing(surface, None, frozenset())
+        m = next(m for m in whole.moving if m.name == name)
+        rest = RigidPose.upright(p.position, p.yaw).then(*m.turn(openness_of(p.params).get(name, 0.0)))
+        return _Thing(surface, rest, frozenset())
+
+    @property
+    def _still(self) -> list[tuple[LitMesh, np.ndarray]]:
+        """The house's own meshes without what is drawn apart, and, of each face, the number that it had."""
+        away, open_ = self._away, {name.partition("/")[0] for name in self._things if "/" in name}
+        return [
+            (_nothing(m), np.zeros(0, int)) if m.owner in away
+            else self._opened(m) if m.owner in open_
+            else (m, np.arange(len(m.faces)))
+            for m in self.bake.lit.meshes
+        ]
+
+    def _opened(self, m: LitMesh) -> tuple[LitMesh, np.ndarray]:
+        """A mesh of furniture that is open: cut open, without its inside and the parts that moved."""
+        p, whole = self.house.placement_by_id[m.owner], self._apart(m.owner)
+        assert whole is not None, "checked by _wanted"
+        at = RigidPose.upright(p.position, p.yaw)
+        local = (m.vertices - np.asarray(at.position, np.float32)) @ at.rotation.astype(np.float32)
+        label = whole.label_at(local[m.faces].mean(1), openness_of(p.params))
+        gone = [k for k, part in enumerate(whole.moving) if f"{m.owner}/{part.name}" in self._things]
+        rows = np.concatenate([local, m.uv], axis=1)
+        fixed, others = np.flatnonzero(label == FIXED), np.flatnonzero((label >= 0) & ~np.isin(label, gone))
+        rows, faces, source = cut_open(whole.holes, rows, m.faces[fixed])
+        vertices = at.points(np.ascontiguousarray(rows[:, :3]))
+        faces = np.concatenate([faces, m.faces[others]])
+        both = dataclasses.replace(m, vertices=vertices, faces=faces, uv=np.ascontiguousarray(rows[:, 3:]))
+        return both, np.concatenate([fixed[source], others])
 
     def _lit_at(self, things: Mapping[str, tuple[Surface, RigidPose]]) -> dict[str, Placed]:
         """Things where they are to be, and the light on them."""
@@ -249,8 +308,7 @@ class MovingHouse:
     @functools.cached_property
     def lit(self) -> LitPages:
         """The house without what moved, and all that moved: as it is drawn."""
-        away = self._away
-        meshes = [m if m.owner not in away else _nothing(m) for m in self.bake.lit.meshes]
+        meshes = [m for m, _ in self._still]
         pages = list(self.bake.lit.pages)
         for thing in self._things.values():
             if thing.surface is None:
@@ -298,9 +356,8 @@ class MovingHouse:
     @property
     def gloss(self) -> GlossData:
         """Gloss of `lit`."""
-        still, meshes = self._gloss_at_rest, self.bake.lit.meshes
-        kept = [bool(len(m.faces)) for m in self.lit.meshes[: len(meshes)]]
-        cut = lambda known: [a if a is None or keep else a[:0] for a, keep in zip(known, kept)]
+        still, kept = self._gloss_at_rest, [source for _, source in self._still]
+        cut = lambda known: [a if a is None else a[source] for a, source in zip(known, kept)]
         surfaces = self.surfaces
         own = [(s, m, g) for s in surfaces for m, g in zip(s.meshes, s.gloss, strict=True)]
         return dataclasses.replace(
@@ -352,11 +409,8 @@ class MovingHouse:
     @functools.cached_property
     def _static(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
         """From starts and directions, (n, 3) each, whether the house without what moved is met, (n,) bool."""
-        away = self._away
         solid = [
-            m.vertices[m.faces]
-            for m in self.bake.lit.meshes
-            if m.page in self._room_of_page and m.alpha >= 0.9 and m.owner not in away
+            m.vertices[m.faces] for m, _ in self._still if m.page in self._room_of_page and m.alpha >= 0.9
         ]
         first = rays_among(np.concatenate(solid))
         return lambda start, ahead: first(start, ahead)[0] >= 0
@@ -497,6 +551,8 @@ class MovingHouse:
         """Tiles whose light is not what was shown last."""
         groups: dict[str, list[Placed]] = {}
         for name, placed in self._placed.items():
+            if name.endswith(INSIDE):  # it hides no more than the thing does
+                continue
             groups.setdefault(BODIES if self._things[name].rest is None else name, []).append(placed)
         moved = [n for n, g in groups.items() if n not in self._hiding or not self._hiding[n].holds(g, slack)]
         before = [self._hiding.pop(n) for n in [*self._hiding] if n in moved or n not in groups]
