@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,8 +20,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from embodied.assets.built.parametric import plain
-from embodied.assets.built.primitives import Shape, between, box, cylinder, part, quads, tube
-from embodied.assets.records import Finish, MeshPart, bounds
+from embodied.assets.built.primitives import box, lathe, part, tube
+from embodied.assets.records import Finish, MeshPart
 
 OPEN = "open/"
 """Start of the params of a placement that say how far its parts are open: ('open/left_door', 0.7)."""
@@ -30,6 +29,10 @@ FLAPS = frozenset({"cooker", "toaster oven"})
 """Classes whose doors hang at their lower edge, where the handle is in the middle."""
 ROUND = frozenset({"washing machine", "tumble dryer"})
 LIDS = frozenset({"toilet", "chest freezer"})
+BASINS = frozenset({"kitchen sink", "bathroom vanity", "double vanity"})
+"""Classes that hold a basin above the inside."""
+PALE = frozenset({"fridge", "kitchen sink", "microwave"})
+"""Classes that are white inside."""
 ONLY_DOORS = frozenset({"microwave", "safe", "wall cabinet", "corner base cabinet"})
 """Classes that have no drawers: what looks like one is a panel of controls, or fixed."""
 CUPBOARDS = frozenset(
@@ -58,6 +61,8 @@ OFF_CENTRE = 0.25
 """Distance of a door's handle from the middle of its front, in widths."""
 RIM = 0.014
 """Width of the frame around what a front closes, metres."""
+BASIN = 0.16
+"""Metres below a front's upper edge that a basin reaches."""
 BACK = 0.02
 """Metres between an inside and the back of the thing."""
 STEP = 0.34
@@ -167,7 +172,10 @@ def taken_apart(object_class: str, parts: tuple[MeshPart, ...]) -> TakenApart | 
     for number, (k, m) in enumerate(zip(order, moving, strict=True)):
         meshes[m.name] = parts_where(parts, labels, number)
         if fronts[k].cut:
-            liner, own = _furnished(m, object_class, finish)
+            low, high = m.inside
+            flat = ((pieces.high - pieces.low)[:, :2] > 0.5 * (high - low)[:2]).all(1) & (label == WITHIN)
+            empty = not (flat & (pieces.low > low - 1e-3).all(1) & (pieces.high < high + 1e-3).all(1)).any()
+            liner, own = _furnished(m, object_class, finish, empty)
             inside += liner
             meshes[m.name] += own
     return TakenApart(parts, tuple(moving), labels, fixed, tuple(inside), meshes, holes)
@@ -290,7 +298,9 @@ def _fronts(s: _Pieces, object_class: str) -> list[_Front]:
             near = _belongs(s, a, b) & thin & (low[:, 1] < face + 0.03) & solid
             a[[0, 2]] = np.minimum(a[[0, 2]], low[near][:, [0, 2]].min(0, initial=np.inf))
             b[[0, 2]] = np.maximum(b[[0, 2]], high[near][:, [0, 2]].max(0, initial=-np.inf))
-        frame = near & (high[:, 1] > (low[seed, 1] + high[seed, 1]) / 2) & (size[:, [0, 2]] > 0.5 * (b - a)[[0, 2]]).any(1)
+        frame = (
+            near & (high[:, 1] > (low[seed, 1] + high[seed, 1]) / 2) & (size[:, [0, 2]] > 0.5 * (b - a)[[0, 2]]).any(1)
+        )
         face = min(face, low[frame, 1].min(initial=face))
         back = min(b[1], face + 0.16) if drawer[seed] else max(b[1], high[near][:, 1].max(initial=-np.inf))
         own = (low[:, [0, 2]] > a[[0, 2]] - ROUND_ABOUT).all(1) & (high[:, [0, 2]] < b[[0, 2]] + ROUND_ABOUT).all(1)
@@ -340,7 +350,9 @@ def _grips(s: _Pieces, pieces: np.ndarray, face: float) -> list[tuple[np.ndarray
     for k in pieces:
         a, b = s.low[k], s.high[k]
         meets = [((a < g[1] + 0.01) & (b > g[0] - 0.01)).all() for g in groups]
-        a, b = (f([x, *(g[i] for g, m in zip(groups, meets) if m)], axis=0) for i, x, f in ((0, a, np.min), (1, b, np.max)))
+        a, b = (
+            f([x, *(g[i] for g, m in zip(groups, meets) if m)], axis=0) for i, x, f in ((0, a, np.min), (1, b, np.max))
+        )
         groups = [*(g for g, m in zip(groups, meets) if not m), (a, b)]
     most = max((face - a[1] for a, _ in groups), default=0.0)
     return [(a, b) for a, b in groups if face - a[1] > 0.6 * most and (b - a).max() > 0.02]
@@ -350,7 +362,8 @@ def _hung(front: np.ndarray, handle: np.ndarray, whole: np.ndarray, object_class
     """The moving part that a front with its handle is; the name is its kind."""
     (x0, face, z0), (x1, back, z1) = front
     off = (handle[:, 0].mean() - (x0 + x1) / 2) / (x1 - x0)
-    inside = np.array([[x0 + RIM, back, z0 + RIM], [x1 - RIM, whole[1, 1] - BACK, z1 - RIM]])
+    below = BASIN if object_class in BASINS else 0.0
+    inside = np.array([[x0 + RIM, back, z0 + RIM], [x1 - RIM, whole[1, 1] - BACK, max(z1 - RIM - below, z0 + 0.05)]])
     if object_class in ROUND:
         inset = 0.2 * (x1 - x0)
         inside = np.array([[x0 + inset, back, z0 + inset], [x1 - inset, whole[1, 1] - 0.1, z1 - inset]])
@@ -378,8 +391,16 @@ def _lids(s: _Pieces) -> list[_Front]:
     own = (s.low > a - ROUND_ABOUT).all(1) & (s.high < b + ROUND_ABOUT).all(1)
     front = np.array([a, b])
     handle = np.array([[(a[0] + b[0]) / 2 - 0.05, a[1], a[2]], [(a[0] + b[0]) / 2 + 0.05, a[1] + 0.02, b[2]]])
-    m = MovingPart("lid", "lid", np.array([-1.0, 0, 0]), np.array([(a[0] + b[0]) / 2, b[1], b[2]]), REACH["lid"],
-                   front, handle, np.array([b, b]))
+    m = MovingPart(
+        "lid",
+        "lid",
+        np.array([-1.0, 0, 0]),
+        np.array([(a[0] + b[0]) / 2, b[1], b[2]]),
+        REACH["lid"],
+        front,
+        handle,
+        np.array([b, b]),
+    )
     return [_Front(m, np.flatnonzero(own), False)]
 
 
@@ -400,48 +421,46 @@ def _named(parts: Sequence[MovingPart]) -> list[MovingPart]:
 
 @dataclass(frozen=True, eq=False)
 class _Hole:
-    """A hole that is cut into what a front closes: faces near it, less what lies in the opening."""
+    """A hole that is cut into a thing behind a front."""
 
     box: np.ndarray
-    """(2, 3) of what is cut away; as deep as faces near the front are."""
+    """(2, 3) of what is cut away."""
     ways: np.ndarray
-    """(k, 2) unit directions of x and z in which the opening ends, as far as the box."""
+    """(k, 3) unit directions in which it ends, as far as the box."""
 
     @staticmethod
     def of(m: MovingPart, is_round: bool) -> _Hole:
-        (x0, _, z0), (x1, _, z1) = m.inside
-        box = np.array([[x0, m.box[0, 1] - 0.002, z0], [x1, m.box[1, 1] + 0.05, z1]])
-        return _Hole(box, _circle(24) if is_round else np.array([[1, 0], [-1, 0], [0, 1], [0, -1]]))
+        low, high = m.inside + [[-1e-3], [1e-3]]
+        sides = _circle(24) if is_round else np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+        ways = np.insert(sides, 1, 0.0, axis=1)
+        return _Hole(np.array([[low[0], m.box[0, 1] - 2e-3, low[2]], high]), np.array([*ways, [0, 1, 0], [0, -1, 0]]))
 
     def cut(self, rows: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Cut a mesh whose vertices (n, 3 + k) are positions and k other values; returns vertices, faces and, for each
         face, the one it was."""
-        low, high = self.box
-        corners = rows[faces, :3]
-        near = (corners[:, :, 1] > low[1]).all(1) & (corners[:, :, 1] < high[1]).all(1)
-        near &= (corners.max(1) > low)[:, [0, 2]].all(1) & (corners.min(1) < high)[:, [0, 2]].all(1)
-        centre, half = (low + high)[[0, 2]] / 2, (high - low)[[0, 2]] / 2
+        middle, half = self.box.mean(0), np.ptp(self.box, axis=0) / 2
+        far = self.ways @ middle + np.linalg.norm(self.ways * half, axis=1)
+        over = rows[faces, :3] @ self.ways.T - far
+        outside, inside = (over > 0).all(1).any(1), (over <= 0).all((1, 2))
         pieces, source = [], []
-        for k in np.flatnonzero(near):
+        for k in np.flatnonzero(~(outside | inside)):
             rest = rows[faces[k]]
-            for way in self.ways:
-                apart, rest = _halves(rest, way, float(way @ centre + np.linalg.norm(way * half)))
+            for way, end in zip(self.ways, far, strict=True):
+                apart, rest = _halves(rest, way, float(end))
                 pieces += [apart[[0, i, i + 1]] for i in range(1, len(apart) - 1)]
                 source += [k] * max(len(apart) - 2, 0)
-                if not len(rest):
+                if len(rest) < 3:
                     break
         more = np.array(pieces, rows.dtype).reshape(-1, rows.shape[1])
         own = np.arange(len(more)).reshape(-1, 3) + len(rows)
         return (
             np.concatenate([rows, more]),
-            np.concatenate([faces[~near], own]).astype(np.int32),
-            np.concatenate([np.flatnonzero(~near), np.array(source, int)]),
+            np.concatenate([faces[outside], own]).astype(np.int32),
+            np.concatenate([np.flatnonzero(outside), np.array(source, int)]),
         )
 
 
-def cut_open(
-    holes: Sequence[_Hole], rows: np.ndarray, faces: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def cut_open(holes: Sequence[_Hole], rows: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cut all holes, as `_Hole.cut`."""
     source = np.arange(len(faces))
     for hole in holes:
@@ -461,8 +480,8 @@ def _circle(n: int) -> np.ndarray:
 
 
 def _halves(polygon: np.ndarray, way: np.ndarray, far: float) -> tuple[np.ndarray, np.ndarray]:
-    """The parts of a convex polygon (k, 8) whose x and z lie farther along a way than `far`, and not."""
-    over = polygon[:, [0, 2]] @ way - far
+    """The parts of a convex polygon, (k, 3 and more), that lie farther along a way than `far`, and not."""
+    over = polygon[:, :3] @ way - far
     apart, rest = [], []
     for k, a in enumerate(over):
         b, here, next_ = over[(k + 1) % len(over)], polygon[k], polygon[(k + 1) % len(over)]
@@ -474,41 +493,58 @@ def _halves(polygon: np.ndarray, way: np.ndarray, far: float) -> tuple[np.ndarra
     return np.array(apart), np.array(rest)
 
 
-def _furnished(m: MovingPart, object_class: str, finish: Finish) -> tuple[list[MeshPart], tuple[MeshPart, ...]]:
-    """The inside that a part closes, and what it takes along."""
+def _furnished(
+    m: MovingPart, object_class: str, finish: Finish, empty: bool
+) -> tuple[list[MeshPart], tuple[MeshPart, ...]]:
+    """The inside that a part closes, with shelves where it is empty, and what the part takes along."""
     (x0, y0, z0), (x1, y1, z1) = m.inside
-    y0 += 0.001
-    white = WHITE if object_class in ("fridge", "kitchen sink") else DARK if object_class in FLAPS else finish
+    skin = WHITE if object_class in PALE else DARK if object_class in FLAPS else finish
     if object_class in ROUND:
-        ring = _circle(24) * (x1 - x0) / 2 + (m.inside.mean(0)[[0, 2]])
-        near, far = (np.stack([ring[:, 0], np.full(24, y), ring[:, 1]], 1) for y in (y0, y1))
-        return [part(STEEL, between(near, far), quads([far[[0, k + 2, k + 1, k]] for k in range(1, 22, 2)]))], ()
-    outer, inner = _rectangle(*m.box[:, 0], *m.box[:, 2], y0), _rectangle(x0, x1, z0, z1, y0)
-    deep = _rectangle(x0, x1, z0, z1, y1)
-    liner = part(white, between(outer, inner), between(inner, deep), quads([deep]))
+        r, deep = (x1 - x0) / 2, y0 - y1
+        drum = lathe([(0, deep), (r + RIM, deep), (r + RIM, 0), (r, 0), (r, deep + 0.01), (0, deep + 0.01)], 24)
+        return [part(STEEL, drum.hung((x0 + x1) / 2, y0, (z0 + z1) / 2))], ()
+    (a, _, c), (b, _, d) = m.box
+    walls = [((a, c), (x0, d)), ((x1, c), (b, d)), ((x0, c), (x1, z0)), ((x0, z1), (x1, d))]
+    boxes = [box([p[0], y0, p[1]], [q[0], y1, q[1]]) for p, q in walls]
+    inside = [part(skin, *boxes, box([a, y1, c], [b, y1 + 0.01, d]))]
     if m.slides:
-        return [liner], (part(WHITE if object_class in ("fridge",) else finish, *_drawer_box(m)),)
-    count = max(1, round((z1 - z0) / STEP))
-    levels = np.linspace(z0, z1, count + 1)[1:-1]
+        return inside, (part(skin, *(box(a, b, 0.001) for a, b in drawer_boards(m))),)
     if object_class in FLAPS:
-        wires = [tube([(x0, y, z), (x1, y, z)], 0.003, 5) for z in (z0 + (z1 - z0) * np.array([0.3, 0.65]))
-                 for y in np.linspace(y0 + 0.03, y1 - 0.02, 9)]
-        return [liner, part(STEEL, *wires)], ()
-    if object_class == "wardrobe" and z1 - z0 > 1.2:
-        levels = np.array([z0 + 0.3, z1 - 0.3])
-        rod = tube([(x0, (y0 + y1) / 2, z1 - 0.36), (x1, (y0 + y1) / 2, z1 - 0.36)], 0.012, 10)
-        return [liner, part(white, *_boards(m, levels)), part(STEEL, rod)], ()
-    boards = _boards(m, levels)
-    return [liner, *([part(white, *boards)] if boards else [])], ()
+        rows = np.linspace(y0 + 0.03, y1 - 0.02, 9)
+        inside.append(
+            part(
+                STEEL, *(tube([(x0, y, z), (x1, y, z)], 0.003, 5) for z in shelf_levels(m, object_class) for y in rows)
+            )
+        )
+    elif empty and (boards := shelf_boards(m, object_class)):
+        inside.append(part(skin, *(box(a, b, 0.001) for a, b in boards)))
+        if _hangs(m, object_class):
+            z = boards[-1][0][2] - 0.06
+            inside.append(part(STEEL, tube([(x0, (y0 + y1) / 2, z), (x1, (y0 + y1) / 2, z)], 0.012, 10)))
+    return inside, ()
 
 
-def _rectangle(x0: float, x1: float, z0: float, z1: float, y: float) -> np.ndarray:
-    return np.array([(x0, y, z0), (x1, y, z0), (x1, y, z1), (x0, y, z1)])
+def _hangs(m: MovingPart, object_class: str) -> bool:
+    """True where clothes hang on a rod."""
+    return object_class == "wardrobe" and float(np.ptp(m.inside[:, 2])) > 1.2
 
 
-def _boards(m: MovingPart, levels: np.ndarray) -> list[Shape]:
+def shelf_levels(m: MovingPart, object_class: str) -> np.ndarray:
+    """(k,) heights of the shelves that an empty inside gets, metres."""
+    z0, z1 = m.inside[:, 2]
+    if object_class in FLAPS:
+        return z0 + (z1 - z0) * np.array([0.3, 0.65])
+    if _hangs(m, object_class):
+        return np.array([z0 + 0.3, z1 - 0.3])
+    return np.linspace(z0, z1, max(1, round((z1 - z0) / STEP)) + 1)[1:-1]
+
+
+def shelf_boards(m: MovingPart, object_class: str) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Corners of those shelves."""
     (x0, y0, _), (x1, y1, _) = m.inside
-    return [box([x0, y0 + 0.03, z - 0.009], [x1, y1, z + 0.009], 0.001) for z in levels]
+    return [
+        (np.array([x0, y0 + 0.03, z - 0.009]), np.array([x1, y1, z + 0.009])) for z in shelf_levels(m, object_class)
+    ]
 
 
 def drawer_boards(m: MovingPart) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -522,7 +558,3 @@ def drawer_boards(m: MovingPart) -> list[tuple[np.ndarray, np.ndarray]]:
         ((x0, y1 - board, z0), (x1, y1, top)),
     ]
     return [(np.array(a), np.array(b)) for a, b in corners]
-
-
-def _drawer_box(m: MovingPart) -> list[Shape]:
-    return [box(a, b, 0.001) for a, b in drawer_boards(m)]

@@ -73,6 +73,8 @@ BRIGHT = (0.3, 2.0)
 """Bounds of how bright what a thing hides is, beside the rest: nine harmonics are no more sure of one direction."""
 INSIDE = "/"
 """End of the name of the inside of a thing that is open; before the name of a part of it stands the same."""
+BEFORE = 0.15
+"""Metres before the front of a thing from which its inside has its light."""
 AWAY = RigidPose((0.0, 0.0, -1e3))
 """Pose of a body that the moment does not have."""
 
@@ -245,8 +247,10 @@ class MovingHouse:
         """The house's own meshes without what is drawn apart, and, of each face, the number that it had."""
         away, open_ = self._away, {name.partition("/")[0] for name in self._things if "/" in name}
         return [
-            (_nothing(m), np.zeros(0, int)) if m.owner in away
-            else self._opened(m) if m.owner in open_
+            (_nothing(m), np.zeros(0, int))
+            if m.owner in away
+            else self._opened(m)
+            if m.owner in open_
             else (m, np.arange(len(m.faces)))
             for m in self.bake.lit.meshes
         ]
@@ -269,7 +273,10 @@ class MovingHouse:
 
     def _lit_at(self, things: Mapping[str, tuple[Surface, RigidPose]]) -> dict[str, Placed]:
         """Things where they are to be, and the light on them."""
-        placed = {name: Placed(s, pose, pose, self._soft_light(s, pose)) for name, (s, pose) in things.items()}
+        placed = {
+            name: Placed(s, pose, pose, self._soft_light(s, pose, name.endswith(INSIDE)))
+            for name, (s, pose) in things.items()
+        }
         if not len(self._portals) or not placed:
             return placed
         every = list(placed.values())
@@ -283,9 +290,12 @@ class MovingHouse:
             for (name, p), part in zip(placed.items(), parts, strict=True)
         }
 
-    def _soft_light(self, s: Surface, pose: RigidPose) -> np.ndarray:
-        """(n, 3) light of luxels but the sun's own."""
-        corners = pose.points(s.box_corners)
+    def _soft_light(self, s: Surface, pose: RigidPose, is_inside: bool) -> np.ndarray:
+        """(n, 3) light of luxels but the sun's own; an inside has it from before its front."""
+        local = s.box_corners.copy()
+        if is_inside:
+            local[:, 1] = local[:, 1].min() - BEFORE
+        corners = pose.points(local)
         middle = corners.mean(0)
         home = room_at(self.house, middle) or self._nearest_room(middle)
         rooms = [room_at(self.house, c) or home for c in corners]
@@ -409,9 +419,7 @@ class MovingHouse:
     @functools.cached_property
     def _static(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
         """From starts and directions, (n, 3) each, whether the house without what moved is met, (n,) bool."""
-        solid = [
-            m.vertices[m.faces] for m, _ in self._still if m.page in self._room_of_page and m.alpha >= 0.9
-        ]
+        solid = [m.vertices[m.faces] for m, _ in self._still if m.page in self._room_of_page and m.alpha >= 0.9]
         first = rays_among(np.concatenate(solid))
         return lambda start, ahead: first(start, ahead)[0] >= 0
 
