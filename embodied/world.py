@@ -29,7 +29,7 @@ from embodied.render.panorama import VFOV36, Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.render.pictures import Baked, PictureSettings, Traced, Unlit, parse_pictures, recorded
 from embodied.render.sightings import FACE, SightingTable, load_table, save_table, sightings_table
-from embodied.scene.house_meshes import Part, house_parts, instance_classes, owners
+from embodied.scene.house_meshes import Part, apart, house_parts, instance_classes, owners
 from embodied.scene.lit_pages import LitPages
 
 if TYPE_CHECKING:
@@ -120,14 +120,24 @@ class World:
         self._moments.append(self.moment)
         self.show(dataclasses.replace(self.moment, moved={**self.moment.moved, thing: pose}))
 
-    def open(self, opening: str, openness: float = 1.0) -> None:
-        """Open a door so far, 0 (closed) to 1 (a right angle); `undo` takes it back.
+    def open(self, name: str, openness: float = 1.0) -> None:
+        """Open a door, drawer or lid so far, 0 (closed) to 1 (of doors, a right angle); `undo` takes it back.
+
+        Args:
+          name: opening id, 'door_1', or placement id and part, 'wardrobe_1/left_door'; `openable` has all of these.
 
         Raises:
-          ValueError: the house has no such door, or it cannot be open so far.
+          ValueError: the house has nothing of this name that opens, or it cannot be open so far.
         """
         self._moments.append(self.moment)
-        self.show(dataclasses.replace(self.moment, openness={**self.moment.openness, opening: float(openness)}))
+        self.show(dataclasses.replace(self.moment, openness={**self.moment.openness, name: float(openness)}))
+
+    @functools.cached_property
+    def openable(self) -> tuple[str, ...]:
+        """Names of all that `open` takes."""
+        doors = (o.id for o in self.house.openings if o.leaf_finish is not None)
+        furniture = ((p.id, apart(self.catalogue, p)) for p in self.house.placements)
+        return (*doors, *(f"{thing}/{m.name}" for thing, whole in furniture if whole for m in whole.moving))
 
     def undo(self) -> None:
         """Go back to the moment before the last `move` or `open`; nothing where there was none."""
@@ -144,18 +154,17 @@ class World:
         """Show the bodies of a MuJoCo model as they are now: a robot that was attached to the house's own model, or one
         alone. Call it again after the physics; bodies named as placements of the house move these, and doors on hinges
         the house's doors."""
-        if self._followed is not model:
-            from embodied.scene.bodies import body_parts  # late: it reads meshes by trimesh
-            from embodied.scene.doors import is_of_door
+        from embodied.scene.bodies import body_name, body_parts, body_poses  # late: it reads meshes by trimesh
+        from embodied.scene.doors import is_of_house, openness
 
+        if self._followed is not model:
+            own = {body_name(model, b) for b in range(1, model.nbody) if is_of_house(model, b, self.house)}
             for name, parts in body_parts(model, self.cache / "bodies").items():
-                if name not in self.house.placement_by_id and not is_of_door(name, self.house):
+                if name not in own:
                     self.add(name, parts)
             self._followed = model
-        from embodied.scene.bodies import body_poses
-        from embodied.scene.doors import openness
-
-        poses = body_poses(model, data, (*self._bodies, *self.house.placement_by_id))
+        free = {model.body(b).name for b in model.jnt_bodyid[model.jnt_type == 0]} & {*self.house.placement_by_id}
+        poses = body_poses(model, data, (*self._bodies, *free))
         bodies = {name: pose for name, pose in poses.items() if name in self._bodies}
         moved = {name: pose for name, pose in poses.items() if name not in self._bodies}
         opened = {**self.moment.openness, **openness(model, data)}
@@ -172,6 +181,10 @@ class World:
           ValueError: the moment is not of this house, or it is drawn by tracing rays, which knows the house at rest.
         """
         moment.check(self.house)
+        if moment.open_parts(self.house) and (
+            unknown := sorted({n for n in moment.openness if "/" in n} - {*self.openable})
+        ):
+            raise ValueError(f"{self.house.name!r} has nothing called {unknown} that opens; World.openable names all")
         if unknown := sorted(set(moment.bodies) - set(self._bodies)):
             raise ValueError(f"bodies {unknown} are unknown; tell of them by World.add first")
         if isinstance(self.pictures, Traced):

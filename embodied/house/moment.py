@@ -84,7 +84,7 @@ class Moment:
     moved: Mapping[str, RigidPose] = field(default_factory=dict)
     """By placement id. What stands on a moved thing and is not named goes with it."""
     openness: Mapping[str, float] = field(default_factory=dict)
-    """By opening id, or by placement id and part, 'wardrobe_1/left_door': 0 is closed, 1 is open, by WIDEST of doors."""
+    """By opening id, or by placement id and part, 'wardrobe_1/left_door': 0 is closed, 1 open, of doors by WIDEST."""
     bodies: Mapping[str, RigidPose] = field(default_factory=dict)
     """By name: things that are no part of the house, such as the links of a robot."""
 
@@ -171,7 +171,9 @@ def carried(root: Placement, pose: RigidPose, p: Placement) -> RigidPose:
 
 def _opened(p: Placement, openness: Mapping[str, float]) -> Placement:
     params = {**dict(p.params), **{OPEN + part: x for part, x in openness.items()}}
-    return dataclasses.replace(p, params=tuple(sorted((k, v) for k, v in params.items() if v or not k.startswith(OPEN))))
+    return dataclasses.replace(
+        p, params=tuple(sorted((k, v) for k, v in params.items() if v or not k.startswith(OPEN)))
+    )
 
 
 def _placed(house: House, p: Placement, pose: RigidPose) -> Placement:

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from embodied.assets.catalogue import Catalogue
-from embodied.assets.moving_parts import FIXED, TakenApart, check_names, cut_open, openness_of
+from embodied.assets.moving_parts import TakenApart, check_names, openness_of
 from embodied.house.house import House
 from embodied.house.moment import WIDEST, Moment, RigidPose
 from embodied.house.shapes import room_at
@@ -47,6 +47,7 @@ from embodied.light.tracing.emitters import GLAZING, portals_of, read_lamps
 from embodied.light.tracing.rays import rays_among
 from embodied.light.tracing.sky import sun_direction, sun_height, sun_strength
 from embodied.render.gloss import GlossData
+from embodied.scene.cupboards import lit_apart
 from embodied.scene.house_meshes import apart, object_parts
 from embodied.scene.joinery import opening_parts
 from embodied.scene.lit_pages import ANYWHERE, LitMesh, LitPages
@@ -260,16 +261,12 @@ class MovingHouse:
         p, whole = self.house.placement_by_id[m.owner], self._apart(m.owner)
         assert whole is not None, "checked by _wanted"
         at = RigidPose.upright(p.position, p.yaw)
-        local = (m.vertices - np.asarray(at.position, np.float32)) @ at.rotation.astype(np.float32)
-        label = whole.label_at(local[m.faces].mean(1), openness_of(p.params))
+        still, source, label = lit_apart(m, p, whole)
         gone = [k for k, part in enumerate(whole.moving) if f"{m.owner}/{part.name}" in self._things]
-        rows = np.concatenate([local, m.uv], axis=1)
-        fixed, others = np.flatnonzero(label == FIXED), np.flatnonzero((label >= 0) & ~np.isin(label, gone))
-        rows, faces, source = cut_open(whole.holes, rows, m.faces[fixed])
-        vertices = at.points(np.ascontiguousarray(rows[:, :3]))
-        faces = np.concatenate([faces, m.faces[others]])
-        both = dataclasses.replace(m, vertices=vertices, faces=faces, uv=np.ascontiguousarray(rows[:, 3:]))
-        return both, np.concatenate([fixed[source], others])
+        others = np.flatnonzero((label >= 0) & ~np.isin(label, gone))
+        faces = np.concatenate([still.faces, m.faces[others]])
+        both = dataclasses.replace(still, vertices=at.points(still.vertices), faces=faces)
+        return both, np.concatenate([source, others])
 
     def _lit_at(self, things: Mapping[str, tuple[Surface, RigidPose]]) -> dict[str, Placed]:
         """Things where they are to be, and the light on them."""

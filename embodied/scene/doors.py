@@ -88,22 +88,28 @@ def is_leaf(part: Part) -> bool:
     return part.mesh_key.startswith("leaf/")
 
 
-def is_of_door(body: str, house: House) -> bool:
-    """True for the bodies of the house's own doors."""
+def is_of_house(model: mujoco.MjModel, body: int, house: House) -> bool:
+    """True for the bodies of the house's own doors and things."""
     names = {o.id for o in house.openings}
-    stem = body.removeprefix("doorway_").removesuffix("_2").removesuffix("_handle")
-    return stem in names and body != stem
+    root = model.body(model.body_rootid[body]).name
+    stem = root.removeprefix("doorway_").removesuffix("_2")
+    return root in house.placement_by_id or (stem in names and root != stem)
 
 
 def openness(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, float]:
-    """How far every door on hinges is open, 0 to 1, by opening; of a pair, the wider leaf."""
+    """How far all that turns or slides is open, 0 to 1: by opening, of a pair the wider leaf, and of furniture by
+    placement id and part."""
     out: dict[str, float] = {}
     for j in range(model.njnt):
+        body, value = model.joint(j).bodyid[0], data.qpos[model.jnt_qposadr[j]]
         stem, hinge, _ = model.joint(j).name.partition("doorhinge")
-        if hinge:
+        root = model.body(model.body_rootid[body]).name
+        if model.nuser_jnt and (reach := model.jnt_user[j, 0]) > 0:
+            part = model.body(body).name.removeprefix(f"{root}_")
+            out[f"{root}/{part}"] = float(np.clip(value / reach, 0, 1))
+        elif hinge:
             opening = stem.rpartition("_")[0]
-            value = float(np.clip(data.qpos[model.jnt_qposadr[j]] / WIDEST, 0, 1))
-            out[opening] = max(out.get(opening, 0.0), value)
+            out[opening] = max(out.get(opening, 0.0), float(np.clip(value / WIDEST, 0, 1)))
     return out
 
 

@@ -47,7 +47,7 @@ def export_mjcf(
     Args:
       free: placements that physics may move, see embodied.scene.model.loose.
       lit: write the house with its baked light instead of its materials.
-      hinged: doors turn on hinges, and house_metadata.json says what bodies and joints are.
+      hinged: doors, drawers and lids move, and house_metadata.json says what bodies and joints are.
 
     Returns:
       The path of house.xml.
@@ -76,7 +76,7 @@ def export_mjcf(
     # MuJoCo writes this one as a word, which dm_control takes for a number.
     xml = re.sub(r'(<headlight[^>]* active=)"(true|false)"', lambda m: f'{m[1]}"{int(m[2] == "true")}"', spec.to_xml())
     xml = re.sub(r"  <compiler[^>]*/>\n\n?", "", xml)  # it would hold for all that is added
-    xml = re.sub(r"(<joint [^>]*?(?:doorhinge|_handle)[^>]*>)", _in_degrees, xml)
+    xml = re.sub(r'(<joint (?![^>]*type="slide")[^>]*>)', _in_degrees, xml)
     if hinged or free:
         write_json(folder / "house_metadata.json", metadata(house, model, free))
     write_bytes(folder / "house.xml", xml.encode())

@@ -10,7 +10,7 @@ import dataclasses
 import functools
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,10 +25,11 @@ import cv2
 import mujoco
 import numpy as np
 
+from embodied.assets.moving_parts import OPEN, TakenApart
 from embodied.assets.records import Finish, MeshPart
 from embodied.geometry import rotation
 from embodied.house.house import House, Placement
-from embodied.scene import backdrop, collision, doors
+from embodied.scene import backdrop, collision, cupboards, doors
 from embodied.scene.doors import Hung
 from embodied.scene.house_meshes import Part, house_parts, owners
 from embodied.scene.landscapes import scenery_of
@@ -49,6 +50,8 @@ PIECES = 24
 PROBE_LIT = "lit_by_probes"
 """Material of a lit house for the bodies that are added to it: they shine in the colour of their light
 (embodied.light.viewer)."""
+INSIDE = 0.5
+"""Brightness of insides in a lit house, where no probes light them."""
 OFFSCREEN = 1024
 """Side of the off-screen buffer: the largest picture, pixels."""
 LOOSE = ("floor", "against_wall", "corner", "surface")
@@ -160,17 +163,14 @@ def build_spec(
 
     Args:
       free, collisions, lit: as for `compile_scene`.
-      hinged: doors turn on hinges (embodied.scene.doors); fixed at their angles without.
+      hinged: doors turn on hinges, and what furniture has moves (embodied.scene.doors, cupboards); fixed without.
       parts: house_parts(house, catalogue) where the caller has them already.
 
     Raises:
-      ValueError: `free` names something that is no placement, or is asked for together with `lit`; `lit` was
-        baked for another house.
+      ValueError: `free` names something that is no placement; `lit` was baked for another house.
     """
     if unknown := sorted(free - set(house.placement_by_id)):
         raise ValueError(f"free names {unknown}, which are no placements of house {house.name!r}")
-    if free and lit is not None:
-        raise ValueError("a lit house is static: its light is painted on; build it without free, or without lit")
     if lit is not None and lit.owners and lit.owners != owners(house):
         raise ValueError(f"this light was baked for another house than {house.name!r}; bake it again (embodied light)")
     spec = _empty_spec(house)
@@ -178,18 +178,24 @@ def build_spec(
         _let_move(spec)
     shell = parts or (shell_parts(house, catalogue.finish) if hinged or collisions else ())
     hung = doors.hang(spec, house, shell) if hinged else {}
+    things = cupboards.openable(house, catalogue, free) if hinged else {}
+    cases = cupboards.hang(spec, house, things)
     bodies = {p: _free_body(spec, house.placement_by_id[p]) for p in sorted(free)}
     if lit is None:
         _light(spec)
         _add_sky(spec, house, getattr(catalogue, "cache", None))
         parts = house_parts(house, catalogue) if parts is None else parts
-        _add_parts(spec, parts, bodies, hung)
+        bodied = [(p, _carrier(p, bodies, hung)) for p in parts if p.owner not in things]
+        bodied += [(p, cases[p.owner, name]) for p, name in cupboards.furniture_parts(house, things)]
+        _add_parts(spec, bodied)
     else:
         spec.visual.headlight.active = 0
-        _add_pages(spec, lit, house, shell, hung)
         spec.add_material(name=PROBE_LIT, emission=1.0, specular=0.0, shininess=0.0)
+        leaves = {p.owner: p for p in shell if doors.is_leaf(p)} if hung else {}
+        _add_pages(spec, lit, house, lambda m: _lit_pieces(m, house, bodies, leaves, hung, things, cases))
+        _add_insides(spec, house, things, cases)
     if collisions:
-        _add_collisions(spec, house, catalogue, bodies)
+        _add_collisions(spec, house, catalogue, bodies, things, cases)
         _add_leaves(spec, shell, hung)
     return spec
 
@@ -214,6 +220,7 @@ def _let_move(spec: mujoco.MjSpec) -> None:
     spec.option.timestep = 0.004
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
 
 
 def _light(spec: mujoco.MjSpec) -> None:
@@ -265,17 +272,20 @@ def yaw_quat(yaw: float) -> list[float]:
     return [math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
 
 
-def _add_parts(
-    spec: mujoco.MjSpec,
-    parts: Sequence[Part],
-    bodies: Mapping[str, mujoco.MjsBody],
-    hung: Mapping[tuple[str, float], Hung],
-) -> None:
+def _carrier(part: Part, bodies: Mapping[str, mujoco.MjsBody], hung: Mapping[tuple[str, float], Hung]) -> Hung | None:
+    """The body that a part belongs to; None for the world's."""
+    if part.owner in bodies:
+        return Hung(bodies[part.owner], (0.0, 0.0, 0.0))
+    return hung.get((part.owner, part.yaw)) if doors.is_leaf(part) else None
+
+
+def _add_parts(spec: mujoco.MjSpec, bodied: Sequence[tuple[Part, Hung | None]]) -> None:
+    parts = [part for part, _ in bodied]
     meshes: dict[str, str] = {}
     looks = _Looks(spec, [p.mesh.finish.texture for p in parts if p.mesh.finish.texture])
     count: dict[str, int] = {}
     drawable: dict[str, bool] = {}
-    for part in parts:
+    for part, carrier in bodied:
         if part.mesh_key not in drawable:
             drawable[part.mesh_key] = _is_drawable(part.mesh)
         if not drawable[part.mesh_key]:
@@ -286,11 +296,9 @@ def _add_parts(
             _add_mesh(spec, meshes[part.mesh_key], part.mesh.vertices, part.mesh.normals, uv, part.mesh.faces)
         k = count[part.owner] = count.get(part.owner, -1) + 1
         material, rgba = looks.of(part.mesh.finish)
-        body = bodies.get(part.owner)
-        pose = {} if body is not None else {"pos": part.position, "quat": yaw_quat(part.yaw)}
-        if doors.is_leaf(part) and (leaf := hung.get((part.owner, part.yaw))) is not None:
-            body, pose = leaf.body, {"pos": leaf.origin}
-        _draw(body or spec.worldbody, f"{part.owner}#{k}", meshes[part.mesh_key], material, rgba, **pose)
+        pose = {"pos": part.position, "quat": yaw_quat(part.yaw)} if carrier is None else {"pos": carrier.origin}
+        body = spec.worldbody if carrier is None else carrier.body
+        _draw(body, f"{part.owner}#{k}", meshes[part.mesh_key], material, rgba, **pose)
 
 
 def _draw(body: mujoco.MjsBody, name: str, mesh: str, material: str, rgba: Sequence[float], **pose: Any) -> None:
@@ -405,29 +413,54 @@ def load_texture(path: str, largest: int = TEXTURE_SIZE) -> np.ndarray:
 
 
 def _add_pages(
-    spec: mujoco.MjSpec,
-    lit: LitPages,
-    house: House,
-    parts: Sequence[Part] = (),
-    hung: Mapping[tuple[str, float], Hung] | None = None,
+    spec: mujoco.MjSpec, lit: LitPages, house: House, pieces: Callable[[LitMesh], Iterable[tuple[LitMesh, Hung | None]]]
 ) -> None:
-    leaves = {p.owner: p for p in parts if doors.is_leaf(p)} if hung else {}
     for i, page in enumerate(lit.pages):
         _add_picture(spec, f"page_{i}", page, emission=1.0)
     count: dict[str, int] = {}
-    for i, m in drawn_meshes(lit, house):
-        k = count[m.owner] = count.get(m.owner, -1) + 1
-        name = f"{i:04d}_{k}_{re.sub(r'[^A-Za-z0-9]+', '_', m.owner)}"
-        vertices, body, pose = m.vertices, spec.worldbody, {}
-        if hung and (p := leaves.get(m.owner)) is not None and (p.owner, p.yaw) in hung:
-            leaf = hung[p.owner, p.yaw]
-            vertices, body, pose = (
-                _unturned(m.vertices - np.array(p.position, np.float32), p.yaw),
-                leaf.body,
-                {"pos": leaf.origin},
-            )
-        _add_mesh(spec, name, vertices, None, m.uv, m.faces)
-        _draw(body, f"{m.owner}#{k}", name, f"page_{m.page}", (1, 1, 1, m.alpha), **pose)
+    for i, whole in drawn_meshes(lit, house):
+        for m, carrier in pieces(whole):
+            k = count[m.owner] = count.get(m.owner, -1) + 1
+            if not len(m.faces):
+                continue
+            name = f"{i:04d}_{k}_{re.sub(r'[^A-Za-z0-9]+', '_', m.owner)}"
+            _add_mesh(spec, name, m.vertices, None, m.uv, m.faces)
+            body, pose = (spec.worldbody, {}) if carrier is None else (carrier.body, {"pos": carrier.origin})
+            _draw(body, f"{m.owner}#{k}", name, f"page_{m.page}", (1, 1, 1, m.alpha), **pose)
+
+
+def _lit_pieces(
+    m: LitMesh,
+    house: House,
+    bodies: Mapping[str, mujoco.MjsBody],
+    leaves: Mapping[str, Part],
+    hung: Mapping[tuple[str, float], Hung],
+    things: Mapping[str, TakenApart],
+    cases: Mapping[tuple[str, str], Hung],
+) -> list[tuple[LitMesh, Hung | None]]:
+    """A lit mesh in the frames of the bodies that carry it."""
+    if m.owner in things:
+        parts = cupboards.lit_parts(m, house.placement_by_id[m.owner], things[m.owner])
+        return [(piece, cases[m.owner, name]) for piece, name in parts]
+    frame = house.placement_by_id[m.owner] if m.owner in bodies else leaves.get(m.owner)
+    carrier = None if frame is None else bodies.get(m.owner) or hung.get((m.owner, frame.yaw))
+    if frame is None or carrier is None:
+        return [(m, None)]
+    vertices = _unturned(m.vertices - np.array(frame.position, np.float32), frame.yaw)
+    carrier = carrier if isinstance(carrier, Hung) else Hung(carrier, (0.0, 0.0, 0.0))
+    return [(dataclasses.replace(m, vertices=vertices), carrier)]
+
+
+def _add_insides(
+    spec: mujoco.MjSpec, house: House, things: Mapping[str, TakenApart], cases: Mapping[tuple[str, str], Hung]
+) -> None:
+    """What closed furniture hides, which was not lit: in a plain colour, as bodies that are added to a lit house."""
+    for k, (part, name) in enumerate(cupboards.furniture_parts(house, things, within=True)):
+        mesh, color = f"inside_{k}", np.array(part.mesh.finish.color)
+        _add_mesh(spec, mesh, part.mesh.vertices, part.mesh.normals, part.mesh.uv, part.mesh.faces)
+        carrier = cases[part.owner, name]
+        dim = (*(color[:3] * INSIDE).tolist(), float(color[3]))
+        _draw(carrier.body, f"{part.owner}#inside{k}", mesh, PROBE_LIT, dim, pos=carrier.origin)
 
 
 def _unturned(vertices: np.ndarray, yaw: float) -> np.ndarray:
@@ -469,7 +502,12 @@ def _pieces(mesh: LitMesh, centre: np.ndarray) -> Iterator[tuple[np.ndarray, np.
 
 
 def _add_collisions(
-    spec: mujoco.MjSpec, house: House, catalogue: Catalogue, bodies: Mapping[str, mujoco.MjsBody]
+    spec: mujoco.MjSpec,
+    house: House,
+    catalogue: Catalogue,
+    bodies: Mapping[str, mujoco.MjsBody],
+    things: Mapping[str, TakenApart],
+    cases: Mapping[tuple[str, str], Hung],
 ) -> None:
     for room in house.rooms:
         _add_boxes(spec.worldbody, f"{room.id}/floor", collision.floor_boxes(house, room))
@@ -478,6 +516,13 @@ def _add_collisions(
     known: dict[tuple, tuple[collision.CollisionBox, ...]] = {}
     for p in house.placements:
         if is_underfoot(p):
+            continue
+        if p.id in things:
+            closed = dataclasses.replace(p, params=tuple(x for x in p.params if not x[0].startswith(OPEN)))
+            solid = placement_boxes(catalogue, closed)
+            for k, (name, box, density) in enumerate(cupboards.boxes_of(catalogue, p, things[p.id], solid)):
+                carrier = cases[p.id, name]
+                _add_boxes(carrier.body, p.id, [box], density=density, position=carrier.origin, first=k)
             continue
         key = (p.asset, p.size, p.params)
         if key not in known:
