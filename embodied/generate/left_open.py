@@ -1,0 +1,83 @@
+"""How far doors, drawers and lids can open in a house, and which of them its household has left open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from embodied.assets.moving_parts import MovingPart
+from embodied.geometry import rotation
+from embodied.house.house import House, Placement
+from embodied.house.moment import WIDEST, Moment
+from embodied.house.shapes import footprint
+from embodied.scene.house_meshes import apart
+from embodied.seeds import stream
+
+if TYPE_CHECKING:
+    from embodied.assets.catalogue import Catalogue
+
+STEPS = np.linspace(0, 1, 19)[1:]
+"""Openness that is tried; of doors, every 5 degrees."""
+NEAR = 0.02
+"""Metres that things may stand in the way: boxes around them are larger than they are."""
+LEFT = {"door": 0.05, "flap": 0.01, "drawer": 0.06, "lid": 0.4}
+"""Share of the parts of furniture that a household leaves open, in a house of middling disorder."""
+AJAR = {"door": (0.05, 0.5), "flap": (0.1, 0.3), "drawer": (0.1, 0.6), "lid": (1.0, 1.0)}
+"""How far."""
+ROOM_DOORS = {"bathroom": (0.6, (0.1, 0.4)), "toilet": (0.6, (0.1, 0.4))}
+"""By kind of room, the share of doors that stand ajar, and how far."""
+
+
+def free_openness(house: House, catalogue: Catalogue) -> dict[str, float]:
+    """How far every part of furniture can open, 0 to 1 by placement id and part, until it meets a wall or the box
+    around another thing; handles may touch."""
+    rooms = {r.id: house.floor(r) for r in house.rooms}
+    boxes = [(p, footprint(p), p.position[2], p.position[2] + p.size[2]) for p in house.placements]
+    out = {}
+    for p in house.placements:
+        whole = apart(catalogue, p)
+        others = [b for b in boxes if b[0].room == p.room and b[0].id != p.id and b[0].parent != p.id]
+        for m in whole.moving if whole is not None else ():
+            met = (k for k, front in enumerate(_swept(p, m)) if _meets(front, rooms[p.room], others))
+            out[f"{p.id}/{m.name}"] = float(([0.0, *STEPS])[next(met, len(STEPS))])
+    return out
+
+
+def _swept(p: Placement, m: MovingPart) -> Iterator[tuple[shapely.Geometry, float, float]]:
+    """Outline on the floor of a part as it opens, shrunk by NEAR, and its lowest and highest point, metres."""
+    corners = np.array(np.meshgrid(*m.box.T)).reshape(3, -1).T
+    for openness in STEPS:
+        turn, shift = m.turn(openness)
+        there = corners @ turn.T + shift
+        outline = shapely.MultiPoint(there[:, :2] @ rotation(p.yaw).T + p.position[:2]).convex_hull
+        yield outline.buffer(-min(NEAR, 0.4 * float(np.ptp(m.box[:, 1])))), *(p.position[2] + there[:, 2].take([0, -1]))
+
+
+def _meets(front: tuple, room: shapely.Polygon, others: list[tuple]) -> bool:
+    outline, low, high = front
+    low, high = min(low, high) + NEAR, max(low, high) - NEAR
+    if not room.buffer(NEAR).contains(outline):
+        return True
+    return any(low < b[3] and high > b[2] and outline.intersects(b[1]) for b in others)
+
+
+def left_open(house: House, catalogue: Catalogue) -> Moment:
+    """What the household has left open, by the house's seed: drawers, doors and lids of furniture, more of them where
+    it is untidy, and bathroom doors ajar. `left_open(house, catalogue).applied(house)` is such a house."""
+    openness: dict[str, float] = {}
+    kinds = {r.id: r.kind for r in house.rooms}
+    for o in house.openings:
+        rng = stream(house.seed, "left open", o.id)
+        share, (least, most) = max((ROOM_DOORS.get(kinds[r], (0.0, (1.0, 1.0))) for r in o.rooms if r in kinds))
+        if o.kind == "door" and o.leaf_finish is not None and rng.random() < share:
+            openness[o.id] = round(min(float(rng.uniform(least, most)), o.angle / WIDEST), 3)
+    for name, free in free_openness(house, catalogue).items():
+        rng = stream(house.seed, "left open", name)
+        kind = next((k for k in LEFT if k in name.rpartition("/")[2]), "door")
+        if rng.random() < LEFT[kind] * 2 * house.disorder and free > 0:
+            openness[name] = round(min(float(rng.uniform(*AJAR[kind])), free), 3)
+    return Moment(openness=openness)
