@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -72,7 +71,7 @@ def left_open(house: House, catalogue: Catalogue) -> Moment:
     kinds = {r.id: r.kind for r in house.rooms}
     for o in house.openings:
         rng = stream(house.seed, "left open", o.id)
-        share, (least, most) = max((ROOM_DOORS.get(kinds[r], (0.0, (1.0, 1.0))) for r in o.rooms if r in kinds))
+        share, (least, most) = max(ROOM_DOORS.get(kinds[r], (0.0, (1.0, 1.0))) for r in o.rooms if r in kinds)
         if o.kind == "door" and o.leaf_finish is not None and rng.random() < share:
             openness[o.id] = round(min(float(rng.uniform(least, most)), o.angle / WIDEST), 3)
     for name, free in free_openness(house, catalogue).items():

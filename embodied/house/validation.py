@@ -9,7 +9,7 @@ from pathlib import Path
 
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.materials import MATERIALS
-from embodied.assets.moving_parts import OPEN, check_names, taken_apart
+from embodied.assets.moving_parts import OPEN
 from embodied.house.house import House, HouseError, Placement
 
 STYLES = ("light", "warm", "dark", "classic", "colourful")
@@ -76,9 +76,10 @@ def _check_placement(house: House, p: Placement, catalogue: Catalogue) -> None:
     known = catalogue.parameters(p.asset)
     for name, value in p.params:
         if name.startswith(OPEN):
-            if isinstance(value, str) or not 0 < value <= 1:
-                raise HouseError(f"object {p.id!r} has {name}={value!r}; more than 0 (closed), at most 1 is wanted")
-            _check_opens(p, name, catalogue)
+            try:
+                catalogue.mesh(p.asset, p.size, p.params)
+            except ValueError as e:
+                raise HouseError(f"object {p.id!r} has {name}={value!r}: {e}") from None
             continue
         if name not in known:
             raise HouseError(
@@ -90,15 +91,6 @@ def _check_placement(house: House, p: Placement, catalogue: Catalogue) -> None:
             raise HouseError(f"object {p.id!r} has {name}={value!r}; a value like {known[name]!r} is wanted")
         if isinstance(value, str) and known[name] in MATERIALS:
             _check_material(f"object {p.id!r}", value)
-
-
-def _check_opens(p: Placement, name: str, catalogue: Catalogue) -> None:
-    closed = tuple(x for x in p.params if not x[0].startswith(OPEN))
-    thing = taken_apart(p.object_class, catalogue.mesh(p.asset, p.size, closed))
-    try:
-        check_names(p.object_class, thing, [name.removeprefix(OPEN)])
-    except ValueError as e:
-        raise HouseError(f"object {p.id!r} has {name!r}, but {e}") from None
 
 
 def _surfaces(house: House, p: Placement, catalogue: Catalogue) -> list[str]:

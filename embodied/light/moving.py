@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from embodied.assets.catalogue import Catalogue
-from embodied.assets.moving_parts import TakenApart, check_names, openness_of
+from embodied.assets.moving_parts import TakenApart, openness_of
 from embodied.house.house import House
 from embodied.house.moment import WIDEST, Moment, RigidPose
 from embodied.house.shapes import room_at
@@ -152,8 +152,7 @@ class MovingHouse:
             if moment.carrier(self.house, p) is not None:
                 raise ValueError(f"{thing!r} was moved; its doors and drawers open where it stands at rest only")
             whole, rest = self._apart(thing), RigidPose.upright(p.position, p.yaw)
-            check_names(p.object_class, whole, openness)
-            assert whole is not None
+            assert whole is not None, "checked by World.show"
             out[thing + INSIDE] = rest
             for m in whole.moving:
                 if m.name in openness:
@@ -233,7 +232,7 @@ class MovingHouse:
     def _part(self, thing: str, name: str) -> _Thing:
         """A door or drawer of furniture, or its inside, which has no name."""
         p, whole = self.house.placement_by_id[thing], self._apart(thing)
-        assert whole is not None, "checked by _wanted"
+        assert whole is not None, "checked by World.show"
         meshes = whole.parts[name] if name else whole.within
         keys = [f"{p.asset}/{p.size}/{p.params}/{name}#{k}" for k in range(len(meshes))]
         surface = self._surface([Part(p.id, "object", p.room, m, k) for m, k in zip(meshes, keys, strict=True)])
@@ -259,7 +258,7 @@ class MovingHouse:
     def _opened(self, m: LitMesh) -> tuple[LitMesh, np.ndarray]:
         """A mesh of furniture that is open: cut open, without its inside and the parts that moved."""
         p, whole = self.house.placement_by_id[m.owner], self._apart(m.owner)
-        assert whole is not None, "checked by _wanted"
+        assert whole is not None, "checked by World.show"
         at = RigidPose.upright(p.position, p.yaw)
         still, source, label = lit_apart(m, p, whole)
         gone = [k for k, part in enumerate(whole.moving) if f"{m.owner}/{part.name}" in self._things]

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from embodied.assets.moving_parts import FIXED, TakenApart, cut_open, drawer_boards, openness_of, shelf_boards
+from embodied.assets.moving_parts import FIXED, TakenApart, boards_of, cut_open, openness_of
 from embodied.house.house import House, Placement
 from embodied.scene import collision
 from embodied.scene.collision import CollisionBox
@@ -38,50 +39,56 @@ THIN = 0.004
 """Side of a box, metres, below which it is left out."""
 
 
-def openable(house: House, catalogue: Meshes, without: frozenset[str] = frozenset()) -> dict[str, TakenApart]:
-    """Furniture with moving parts by placement id, taken apart."""
-    return {p.id: x for p in house.placements if p.id not in without and (x := apart(catalogue, p)) is not None}
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Furniture with moving parts, and the bodies of them; '' is what stands still, '<part>_handle' a handle."""
+
+    placement: Placement
+    whole: TakenApart
+    bodies: Mapping[str, Hung]
 
 
-def hang(spec: mujoco.MjSpec, house: House, things: Mapping[str, TakenApart]) -> dict[tuple[str, str], Hung]:
-    """Add the bodies, joints and regions of furniture to a spec that counts in degrees; by placement id and part, and
-    by id and '' for what stands still."""
-    out: dict[tuple[str, str], Hung] = {}
-    for thing, whole in things.items():
-        p = house.placement_by_id[thing]
-        still = spec.worldbody.add_body(
-            name=thing, pos=p.position, quat=[math.cos(p.yaw / 2), 0, 0, math.sin(p.yaw / 2)]
+def hang(spec: mujoco.MjSpec, house: House, catalogue: Meshes, without: frozenset[str]) -> dict[str, Case]:
+    """Add the bodies, joints and regions of furniture to a spec that counts in degrees.
+
+    Args:
+      without: placements that are left out.
+
+    Returns:
+      Them by placement id.
+    """
+    known = ((p, apart(catalogue, p)) for p in house.placements if p.id not in without)
+    return {p.id: _case(spec, p, whole) for p, whole in known if whole is not None}
+
+
+def _case(spec: mujoco.MjSpec, p: Placement, whole: TakenApart) -> Case:
+    half, (w, d, h) = p.yaw / 2, p.size
+    still = spec.worldbody.add_body(name=p.id, pos=p.position, quat=[math.cos(half), 0, 0, math.sin(half)])
+    _region(still, f"{p.id}_reg_main", np.array([[-w / 2, -d / 2, 0], [w / 2, d / 2, h]]))
+    bodies = {"": Hung(still, (0.0, 0.0, 0.0))}
+    hollow = sum(m.kind != "lid" for m in whole.moving)
+    for m in whole.moving:
+        is_drawer, value = m.kind == "drawer", openness_of(p.params).get(m.name, 0.0)
+        scale, (turn, shift) = 1.0 if is_drawer else math.degrees(1), m.turn(value)
+        quat, at = Rotation.from_matrix(turn).as_quat()[[3, 0, 1, 2]], tuple((-m.origin).tolist())
+        body = still.add_body(name=f"{p.id}_{m.name}", pos=turn @ m.origin + shift, quat=quat)
+        handle = body.add_body(name=f"{p.id}_{m.name}_handle", pos=at)
+        body.gravcomp = handle.gravcomp = float(m.kind in ("flap", "lid"))  # springs hold them
+        joint = body.add_joint(
+            name=joint_name(p, m.name),
+            type=mujoco.mjtJoint.mjJNT_SLIDE if is_drawer else mujoco.mjtJoint.mjJNT_HINGE,
+            axis=m.axis,
+            range=[0, m.reach * scale],
+            limited=True,
+            ref=value * m.reach * scale,
+            **PHYSICS[m.kind],
         )
-        out[thing, ""] = Hung(still, (0.0, 0.0, 0.0))
-        w, d, h = p.size
-        _region(still, f"{thing}_reg_main", np.array([[-w / 2, -d / 2, 0], [w / 2, d / 2, h]]))
-        hollow = [m for m in whole.moving if np.ptp(m.inside, axis=0).all()]
-        for m in whole.moving:
-            value = openness_of(p.params).get(m.name, 0.0)
-            turn, shift = m.turn(value)
-            x, y, z, w_ = Rotation.from_matrix(turn).as_quat()
-            body = still.add_body(name=f"{thing}_{m.name}", pos=turn @ m.origin + shift, quat=[w_, x, y, z])
-            body.gravcomp = float(m.kind in ("flap", "lid"))  # springs hold them
-            scale = 1.0 if m.slides else math.degrees(1)
-            joint = body.add_joint(
-                name=joint_name(thing, p.object_class, m.name),
-                type=mujoco.mjtJoint.mjJNT_SLIDE if m.slides else mujoco.mjtJoint.mjJNT_HINGE,
-                axis=m.axis,
-                range=[0, m.reach * scale],
-                limited=True,
-                ref=value * m.reach * scale,
-                **PHYSICS[m.kind],
-            )
-            joint.userdata = [m.reach]
-            at = tuple((-m.origin).tolist())
-            out[thing, m.name] = Hung(body, at)
-            if m in hollow:
-                name = f"{thing}_reg_int" + (f"_{m.name}" if len(hollow) > 1 else "")
-                _region(body if m.slides else still, name, m.inside - (m.origin if m.slides else 0))
-            handle = body.add_body(name=f"{thing}_{m.name}_handle", pos=at)
-            handle.gravcomp = body.gravcomp
-            out[thing, f"{m.name}_handle"] = Hung(handle, (0.0, 0.0, 0.0))
-    return out
+        joint.userdata = [m.reach]  # openness 1
+        bodies |= {m.name: Hung(body, at), f"{m.name}_handle": Hung(handle, (0.0, 0.0, 0.0))}
+        if m.kind != "lid":
+            name = f"{p.id}_reg_int" + (f"_{m.name}" if hollow > 1 else "")
+            _region(*((body, name, m.inside - m.origin) if is_drawer else (still, name, m.inside)))
+    return Case(p, whole, bodies)
 
 
 def _region(body: mujoco.MjsBody, name: str, corners: np.ndarray) -> None:
@@ -99,33 +106,29 @@ def _region(body: mujoco.MjsBody, name: str, corners: np.ndarray) -> None:
     )
 
 
-def joint_name(thing: str, object_class: str, part: str) -> str:
+def joint_name(p: Placement, part: str) -> str:
     """The name of the joint of a part."""
-    if object_class == "microwave":
-        return f"{thing}_microjoint"
+    word = part.replace("_", "")
+    if p.object_class == "microwave":
+        return f"{p.id}_microjoint"
     if part.startswith("drawer"):
-        return f"{thing}_{part.replace('_', '')}_slidejoint" if part != "drawer" else f"{thing}_slidejoint"
-    return f"{thing}_lid_joint" if part == "lid" else f"{thing}_{part.replace('_', '')}hinge"
+        return f"{p.id}_slidejoint" if part == "drawer" else f"{p.id}_{word}_slidejoint"
+    return f"{p.id}_lid_joint" if part == "lid" else f"{p.id}_{word}hinge"
 
 
-def furniture_parts(
-    house: House, things: Mapping[str, TakenApart], *, within: bool = False
-) -> Iterator[tuple[Part, str]]:
-    """The meshes of furniture in its own frame, closed, each with the name of its moving part or ''.
+def parts_of(case: Case, *, hidden: bool = False) -> Iterator[tuple[Part, Hung]]:
+    """The meshes of furniture in its own frame, closed, with the bodies that carry them.
 
     Args:
-      within: those alone that a closed thing does not show: insides and drawers' boxes.
+      hidden: those alone that a closed thing does not show: its inside and drawers' boxes.
     """
-    for thing, whole in things.items():
-        p = house.placement_by_id[thing]
-        shown = {"": whole.within if within else (*whole.fixed, *whole.within)}
-        for k, m in enumerate(whole.moving):
-            seen = sum(bool((of == k).any()) for of in whole.labels) if within else 0
-            shown[m.name] = whole.parts[m.name][seen:]
-        for name, meshes in shown.items():
-            for k, mesh in enumerate(meshes):
-                key = f"{p.asset}/{p.size}/{p.params}/{name}/{within}#{k}"
-                yield Part(thing, "object", p.room, mesh, key), name
+    p, whole = case.placement, case.whole
+    shown = {"": whole.within if hidden else (*whole.fixed, *whole.within)}
+    for k, m in enumerate(whole.moving):
+        shown[m.name] = whole.parts[m.name][hidden * sum(bool((of == k).any()) for of in whole.labels) :]
+    for name, meshes in shown.items():
+        for k, mesh in enumerate(meshes):
+            yield Part(p.id, "object", p.room, mesh, f"{p.asset}/{p.size}/{p.params}/{name}/{k}"), case.bodies[name]
 
 
 def lit_apart(m: LitMesh, p: Placement, whole: TakenApart) -> tuple[LitMesh, np.ndarray, np.ndarray]:
@@ -140,38 +143,36 @@ def lit_apart(m: LitMesh, p: Placement, whole: TakenApart) -> tuple[LitMesh, np.
     return dataclasses.replace(m, vertices=rows[:, :3].copy(), faces=faces, uv=rows[:, 3:].copy()), fixed[source], label
 
 
-def lit_parts(m: LitMesh, p: Placement, whole: TakenApart) -> Iterator[tuple[LitMesh, str]]:
-    """A lit mesh of furniture by moving part, closed, in the thing's frame; '' is what stands still."""
+def lit_parts(m: LitMesh, case: Case) -> Iterator[tuple[LitMesh, Hung]]:
+    """A lit mesh of furniture by moving part, closed, in the thing's frame, with the bodies that carry it."""
+    p, whole = case.placement, case.whole
     still, _, label = lit_apart(m, p, whole)
-    yield still, ""
+    yield still, case.bodies[""]
     for k, part in enumerate(whole.moving):
         back, shift = part.turn(openness_of(p.params).get(part.name, 0.0))
         vertices = ((still.vertices - shift) @ back).astype(np.float32)
-        yield dataclasses.replace(still, vertices=vertices, faces=m.faces[label == k]), part.name
+        yield dataclasses.replace(still, vertices=vertices, faces=m.faces[label == k]), case.bodies[part.name]
 
 
-def boxes_of(
-    catalogue: Meshes, p: Placement, whole: TakenApart, solid: tuple[CollisionBox, ...]
-) -> Iterator[tuple[str, CollisionBox, float]]:
-    """Collision boxes with the part that has them and their density, kg per cubic metre: what is left of those of the
-    closed thing around its openings, shelves, fronts, handles, drawers' boxes."""
-    density = collision.density_of(catalogue.assets[p.asset])
+def boxes_of(case: Case, density: float, solid: Sequence[CollisionBox]) -> Iterator[tuple[Hung, CollisionBox, float]]:
+    """Collision boxes with the bodies that have them and their density, kg per cubic metre: what is left of those of
+    the closed thing around its openings, shelves, fronts, handles, drawers' boxes."""
     left = [(np.subtract(b.centre, b.half), np.add(b.centre, b.half)) for b in solid]
-    for m in whole.moving:
-        front = m.box + np.array([[-GAP, -1.0, -GAP], [GAP, GAP, GAP]])
-        if m.kind == "lid":
-            front = m.box + np.array([[-GAP, -GAP, -GAP], [GAP, GAP, 1.0]])
-        for hole in (front, m.inside):
+    for m in case.whole.moving:
+        body = case.bodies[m.name]
+        free = [[-GAP, -GAP, -GAP], [GAP, GAP, 1.0]] if m.kind == "lid" else [[-GAP, -1.0, -GAP], [GAP, GAP, GAP]]
+        for hole in (m.box + free, m.inside):
             left = [piece for b in left for piece in collision.without(b, (hole[0], hole[1]))]
-        yield m.name, _box(m.box + np.array([[GAP], [-GAP]]) * [1, 0, 1]), LEAF_DENSITY
-        yield f"{m.name}_handle", _box(m.handle), LEAF_DENSITY
-        if m.slides:
-            yield from ((m.name, _box(np.array(b)), LEAF_DENSITY) for b in drawer_boards(m))
-        elif m.kind == "door":
-            left += shelf_boards(m, p.object_class)
+        yield body, _box(m.box + np.array([[GAP], [-GAP]]) * [1, 0, 1]), LEAF_DENSITY
+        yield case.bodies[f"{m.name}_handle"], _box(m.handle), LEAF_DENSITY
+        boards = boards_of(m, case.placement.object_class) if m.cut else []
+        if m.kind == "drawer":
+            yield from ((body, _box(np.array(b)), LEAF_DENSITY) for b in boards)
+        else:
+            left += boards
     for b in left:
         if np.ptp(b, axis=0).min() > THIN:
-            yield "", _box(np.array(b)), density
+            yield case.bodies[""], _box(np.array(b)), density
 
 
 def _box(corners: np.ndarray) -> CollisionBox:

@@ -25,11 +25,12 @@ import cv2
 import mujoco
 import numpy as np
 
-from embodied.assets.moving_parts import OPEN, TakenApart
+from embodied.assets.moving_parts import OPEN
 from embodied.assets.records import Finish, MeshPart
 from embodied.geometry import rotation
 from embodied.house.house import House, Placement
 from embodied.scene import backdrop, collision, cupboards, doors
+from embodied.scene.cupboards import Case
 from embodied.scene.doors import Hung
 from embodied.scene.house_meshes import Part, house_parts, owners
 from embodied.scene.landscapes import scenery_of
@@ -178,24 +179,24 @@ def build_spec(
         _let_move(spec)
     shell = parts or (shell_parts(house, catalogue.finish) if hinged or collisions else ())
     hung = doors.hang(spec, house, shell) if hinged else {}
-    things = cupboards.openable(house, catalogue, free) if hinged else {}
-    cases = cupboards.hang(spec, house, things)
-    bodies = {p: _free_body(spec, house.placement_by_id[p]) for p in sorted(free)}
+    cases = cupboards.hang(spec, house, catalogue, free) if hinged else {}
+    bodies = {p: Hung(_free_body(spec, house.placement_by_id[p]), (0.0, 0.0, 0.0)) for p in sorted(free)}
     if lit is None:
         _light(spec)
         _add_sky(spec, house, getattr(catalogue, "cache", None))
         parts = house_parts(house, catalogue) if parts is None else parts
-        bodied = [(p, _carrier(p, bodies, hung)) for p in parts if p.owner not in things]
-        bodied += [(p, cases[p.owner, name]) for p, name in cupboards.furniture_parts(house, things)]
-        _add_parts(spec, bodied)
+        own = lambda p: bodies.get(p.owner) or (hung.get((p.owner, p.yaw)) if doors.is_leaf(p) else None)
+        carried = [(p, own(p)) for p in parts if p.owner not in cases]
+        _add_parts(spec, [*carried, *(x for case in cases.values() for x in cupboards.parts_of(case))])
     else:
         spec.visual.headlight.active = 0
         spec.add_material(name=PROBE_LIT, emission=1.0, specular=0.0, shininess=0.0)
-        leaves = {p.owner: p for p in shell if doors.is_leaf(p)} if hung else {}
-        _add_pages(spec, lit, house, lambda m: _lit_pieces(m, house, bodies, leaves, hung, things, cases))
-        _add_insides(spec, house, things, cases)
+        frames = {p.owner: (p, hung[p.owner, p.yaw]) for p in shell if doors.is_leaf(p) and (p.owner, p.yaw) in hung}
+        frames |= {p: (house.placement_by_id[p], body) for p, body in bodies.items()}
+        _add_pages(spec, lit, house, lambda m: _lit_pieces(m, frames, cases))
+        _add_insides(spec, cases)
     if collisions:
-        _add_collisions(spec, house, catalogue, bodies, things, cases)
+        _add_collisions(spec, house, catalogue, bodies, cases)
         _add_leaves(spec, shell, hung)
     return spec
 
@@ -270,13 +271,6 @@ def _free_body(spec: mujoco.MjSpec, p: Placement) -> mujoco.MjsBody:
 def yaw_quat(yaw: float) -> list[float]:
     """w x y z of a turn about z."""
     return [math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
-
-
-def _carrier(part: Part, bodies: Mapping[str, mujoco.MjsBody], hung: Mapping[tuple[str, float], Hung]) -> Hung | None:
-    """The body that a part belongs to; None for the world's."""
-    if part.owner in bodies:
-        return Hung(bodies[part.owner], (0.0, 0.0, 0.0))
-    return hung.get((part.owner, part.yaw)) if doors.is_leaf(part) else None
 
 
 def _add_parts(spec: mujoco.MjSpec, bodied: Sequence[tuple[Part, Hung | None]]) -> None:
@@ -430,37 +424,26 @@ def _add_pages(
 
 
 def _lit_pieces(
-    m: LitMesh,
-    house: House,
-    bodies: Mapping[str, mujoco.MjsBody],
-    leaves: Mapping[str, Part],
-    hung: Mapping[tuple[str, float], Hung],
-    things: Mapping[str, TakenApart],
-    cases: Mapping[tuple[str, str], Hung],
-) -> list[tuple[LitMesh, Hung | None]]:
+    m: LitMesh, frames: Mapping[str, tuple[Part | Placement, Hung]], cases: Mapping[str, Case]
+) -> Iterable[tuple[LitMesh, Hung | None]]:
     """A lit mesh in the frames of the bodies that carry it."""
-    if m.owner in things:
-        parts = cupboards.lit_parts(m, house.placement_by_id[m.owner], things[m.owner])
-        return [(piece, cases[m.owner, name]) for piece, name in parts]
-    frame = house.placement_by_id[m.owner] if m.owner in bodies else leaves.get(m.owner)
-    carrier = None if frame is None else bodies.get(m.owner) or hung.get((m.owner, frame.yaw))
-    if frame is None or carrier is None:
+    if m.owner in cases:
+        return cupboards.lit_parts(m, cases[m.owner])
+    if m.owner not in frames:
         return [(m, None)]
+    frame, carrier = frames[m.owner]
     vertices = _unturned(m.vertices - np.array(frame.position, np.float32), frame.yaw)
-    carrier = carrier if isinstance(carrier, Hung) else Hung(carrier, (0.0, 0.0, 0.0))
     return [(dataclasses.replace(m, vertices=vertices), carrier)]
 
 
-def _add_insides(
-    spec: mujoco.MjSpec, house: House, things: Mapping[str, TakenApart], cases: Mapping[tuple[str, str], Hung]
-) -> None:
+def _add_insides(spec: mujoco.MjSpec, cases: Mapping[str, Case]) -> None:
     """What closed furniture hides, which was not lit: in a plain colour, as bodies that are added to a lit house."""
-    for k, (part, name) in enumerate(cupboards.furniture_parts(house, things, within=True)):
-        mesh, color = f"inside_{k}", np.array(part.mesh.finish.color)
+    hidden = (x for case in cases.values() for x in cupboards.parts_of(case, hidden=True))
+    for k, (part, carrier) in enumerate(hidden):
+        mesh, (r, g, b, alpha) = f"inside_{k}", part.mesh.finish.color
         _add_mesh(spec, mesh, part.mesh.vertices, part.mesh.normals, part.mesh.uv, part.mesh.faces)
-        carrier = cases[part.owner, name]
-        dim = (*(color[:3] * INSIDE).tolist(), float(color[3]))
-        _draw(carrier.body, f"{part.owner}#inside{k}", mesh, PROBE_LIT, dim, pos=carrier.origin)
+        color = (INSIDE * r, INSIDE * g, INSIDE * b, alpha)
+        _draw(carrier.body, f"{part.owner}#inside{k}", mesh, PROBE_LIT, color, pos=carrier.origin)
 
 
 def _unturned(vertices: np.ndarray, yaw: float) -> np.ndarray:
@@ -502,12 +485,7 @@ def _pieces(mesh: LitMesh, centre: np.ndarray) -> Iterator[tuple[np.ndarray, np.
 
 
 def _add_collisions(
-    spec: mujoco.MjSpec,
-    house: House,
-    catalogue: Catalogue,
-    bodies: Mapping[str, mujoco.MjsBody],
-    things: Mapping[str, TakenApart],
-    cases: Mapping[tuple[str, str], Hung],
+    spec: mujoco.MjSpec, house: House, catalogue: Catalogue, bodies: Mapping[str, Hung], cases: Mapping[str, Case]
 ) -> None:
     for room in house.rooms:
         _add_boxes(spec.worldbody, f"{room.id}/floor", collision.floor_boxes(house, room))
@@ -517,19 +495,19 @@ def _add_collisions(
     for p in house.placements:
         if is_underfoot(p):
             continue
-        if p.id in things:
+        density = collision.density_of(catalogue.assets[p.asset])
+        if p.id in cases:
             closed = dataclasses.replace(p, params=tuple(x for x in p.params if not x[0].startswith(OPEN)))
-            solid = placement_boxes(catalogue, closed)
-            for k, (name, box, density) in enumerate(cupboards.boxes_of(catalogue, p, things[p.id], solid)):
-                carrier = cases[p.id, name]
-                _add_boxes(carrier.body, p.id, [box], density=density, position=carrier.origin, first=k)
+            boxes = cupboards.boxes_of(cases[p.id], density, placement_boxes(catalogue, closed))
+            for k, (carrier, box, heavy) in enumerate(boxes):
+                _add_boxes(carrier.body, p.id, [box], density=heavy, position=carrier.origin, first=k)
             continue
         key = (p.asset, p.size, p.params)
         if key not in known:
             known[key] = placement_boxes(catalogue, p)
         boxes = known[key]
         if p.id in bodies:
-            _add_boxes(bodies[p.id], p.id, boxes, density=collision.density_of(catalogue.assets[p.asset]))
+            _add_boxes(bodies[p.id].body, p.id, boxes, density=density)
         else:
             _add_boxes(spec.worldbody, p.id, boxes, position=p.position, yaw=p.yaw)
 
