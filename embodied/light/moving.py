@@ -236,10 +236,10 @@ class MovingHouse:
         meshes = whole.parts[name] if name else whole.within
         keys = [f"{p.asset}/{p.size}/{p.params}/{name}#{k}" for k in range(len(meshes))]
         surface = self._surface([Part(p.id, "object", p.room, m, k) for m, k in zip(meshes, keys, strict=True)])
-        if not name:
-            return _Thing(surface, None, frozenset())
-        m = next(m for m in whole.moving if m.name == name)
-        rest = RigidPose.upright(p.position, p.yaw).then(*m.turn(openness_of(p.params).get(name, 0.0)))
+        rest = RigidPose.upright(p.position, p.yaw)
+        for m in whole.moving:
+            if m.name == name:
+                rest = rest.then(*m.turn(openness_of(p.params).get(name, 0.0)))
         return _Thing(surface, rest, frozenset())
 
     @property
@@ -494,7 +494,7 @@ class MovingHouse:
         self._sunlit = {}
         for name in names:
             thing = self._things[name]
-            if thing.surface is None or thing.rest is None:
+            if thing.surface is None or thing.rest is None or name.endswith(INSIDE):
                 continue
             placed = self._lit_at({name: (thing.surface, thing.rest)})[name]
             low, high = placed.box

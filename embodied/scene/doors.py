@@ -10,7 +10,7 @@ and reads house_metadata.json.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -113,35 +113,22 @@ def openness(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, float]:
     return out
 
 
-def metadata(house: House, model: mujoco.MjModel, free: frozenset[str]) -> dict[str, Any]:
+def metadata(house: House, model: mujoco.MjModel) -> dict[str, Any]:
     """Facts for house_metadata.json, of MolmoSpaces' form: by body, what it is and what its bodies and joints are
     called."""
-    categories = {p.id: (p.asset, p.object_class) for p in house.placements}
-    joints: Mapping[int, list[str]] = {
-        b: [model.joint(j).name for j in range(model.njnt) if model.body_rootid[model.jnt_bodyid[j]] == b]
-        for b in range(1, model.nbody)
-        if model.body_rootid[b] == b
-    }
+    things = {p.id: (p.asset, p.object_class) for p in house.placements}
+    roots = [b for b in range(1, model.nbody) if model.body_rootid[b] == b]
     objects = {}
-    for body, named in joints.items():
-        name = model.body(body).name
-        asset, category = categories.get(name, ("doorway", "doorway"))
+    for name in dict.fromkeys([*(model.body(b).name for b in roots), *things]):
+        asset, category = things.get(name, ("doorway", "doorway"))
+        body = next((b for b in roots if model.body(b).name == name), -1)
         bodies = [model.body(b).name for b in range(1, model.nbody) if model.body_rootid[b] == body]
-        names = {"bodies": {n: n for n in bodies}, "joints": {n: n for n in named}}
+        joints = [model.joint(j).name for j in range(model.njnt) if model.body_rootid[model.jnt_bodyid[j]] == body]
         objects[name] = {
             "asset_id": asset,
             "object_id": name,
             "category": category,
-            "is_static": False,
-            "name_map": names,
+            "is_static": not joints,
+            "name_map": {"bodies": {n: n for n in bodies}, "joints": {n: n for n in joints}},
         }
-    for p in house.placements:
-        if p.id not in free:
-            objects[p.id] = {
-                "asset_id": p.asset,
-                "object_id": p.id,
-                "category": p.object_class,
-                "is_static": True,
-                "name_map": {"bodies": {}, "joints": {}},
-            }
     return {"objects": objects}

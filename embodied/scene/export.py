@@ -78,7 +78,7 @@ def export_mjcf(
     xml = re.sub(r"  <compiler[^>]*/>\n\n?", "", xml)  # it would hold for all that is added
     xml = re.sub(r'(<joint (?![^>]*type="slide")[^>]*>)', _in_degrees, xml)
     if hinged or free:
-        write_json(folder / "house_metadata.json", metadata(house, model, free))
+        write_json(folder / "house_metadata.json", metadata(house, model))
     write_bytes(folder / "house.xml", xml.encode())
     return folder / "house.xml"
 

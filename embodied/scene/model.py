@@ -57,6 +57,8 @@ OFFSCREEN = 1024
 """Side of the off-screen buffer: the largest picture, pixels."""
 LOOSE = ("floor", "against_wall", "corner", "surface")
 """Supports under which a freed object can move; what hangs on walls and ceilings stays fixed."""
+SMALL = 0.5
+"""Longest side of what a hand can take, metres."""
 LEAVES = ("/leaf", "/leaf_2", "/glass")
 """Ends of the owners of what closes an opening."""
 HOLLOW = ("person",)
@@ -143,6 +145,13 @@ def loose(house: House, catalogue: Catalogue) -> frozenset[str]:
         and not is_underfoot(p)
         and (p.parent is not None or p.position[2] <= floors[p.room] + UNDERFOOT)  # else it is fixed to a wall
     )
+
+
+def takeable(house: House, catalogue: Catalogue) -> frozenset[str]:
+    """Those of them that a hand can take: no larger than SMALL, and nothing rests on them."""
+    carry = {p.parent for p in house.placements}
+    sizes = {p.id: max(p.size) for p in house.placements}
+    return frozenset(i for i in loose(house, catalogue) if sizes[i] <= SMALL and i not in carry)
 
 
 def is_underfoot(p: Placement) -> bool:

@@ -47,7 +47,9 @@ class MjcfOptions(HouseOptions):
     out: OutputFolder
     """Folder to write."""
     hinged: bool = False
-    """Let doors turn on hinges; house_metadata.json names their bodies and joints."""
+    """Let doors, drawers and lids move; house_metadata.json names their bodies and joints."""
+    loose: bool = False
+    """Let small things fall, slide and be taken."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,10 +73,12 @@ def run_glb(args: GlbOptions) -> None:
 def run_mjcf(args: MjcfOptions) -> None:
     from embodied.locks import locked
     from embodied.scene.export import export_mjcf
+    from embodied.scene.model import takeable
 
     house, catalogue, lit = lit_house(args)
+    free = takeable(house, catalogue) if args.loose else frozenset()
     with locked(args.out):
-        path = export_mjcf(house, catalogue, args.out, lit=lit, hinged=args.hinged)
+        path = export_mjcf(house, catalogue, args.out, lit=lit, hinged=args.hinged, free=free)
     show_written(args, "mjcf", house, lit, path)
 
 
