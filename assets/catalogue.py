@@ -26,7 +26,7 @@ from embodied.assets.importing.own import OwnModel, import_own, read_own, source
 from embodied.assets.importing.packs import find_packs, pack_of
 from embodied.assets.importing.sh3f import open_pack
 from embodied.assets.json_file import RecordError
-from embodied.assets.moving_parts import OPEN, opened, openness_of
+from embodied.assets.moving_parts import closed, opened, openness_of
 from embodied.assets.records import Asset, Finish, ImportRecipe, MeshPart
 from embodied.assets.rows import DATA, check_classes, read_json, read_models
 
@@ -171,8 +171,7 @@ class Catalogue:
 
     def _scale(self, key: str, size: tuple[float, float, float], params: Params) -> tuple[MeshPart, ...]:
         if openness := openness_of(params):
-            closed = self.mesh(key, size, tuple(x for x in params if not x[0].startswith(OPEN)))
-            return opened(self.assets[key].object_class, closed, openness)
+            return opened(self.assets[key].object_class, self.mesh(key, size, closed(params)), openness)
         if key not in self._recipes:
             return BUILT_ASSETS[key].make(size, params, self.finish)
         own = self.assets[key].size

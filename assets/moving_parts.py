@@ -39,7 +39,7 @@ ONLY_DOORS = {"microwave", "safe", "wall cabinet", "corner base cabinet"}
 """Classes that have no drawers: what looks like one is a panel of controls, or fixed."""
 BASINS, BASIN = {"kitchen sink", "bathroom vanity", "double vanity"}, 0.16
 """Classes that hold a basin, which reaches so many metres below the upper edge of a front."""
-REACH = {"door": math.pi / 2, "flap": 1.45, "lid": 1.5}
+FULL_TURN = {"door": math.pi / 2, "flap": 1.45, "lid": 1.5}
 """Radians at openness 1; a drawer comes out by PULL of its depth."""
 PULL = 0.75
 LEAST_AREA, LEAST_SIDES = 0.008, (0.09, 0.08)
@@ -106,9 +106,9 @@ class TakenApart:
     labels: tuple[np.ndarray, ...]
     """(m,) int of the faces of each of its meshes: number of the part they belong to, or FIXED, or WITHIN."""
     holes: tuple[Corners, ...]
-    """Where the thing must be cut open: (k, 3) unit directions in which a hole ends, and (k,) how far, metres."""
+    """Holes by which it is cut open: (k, 3) unit directions in which a hole ends, and (k,) how far, metres."""
     fixed: tuple[MeshPart, ...]
-    """What stays: cut open, without what is within."""
+    """Meshes that stay: cut open, without what is within."""
     within: tuple[MeshPart, ...]
     """The inside, which is seen when something is open."""
     parts: Mapping[str, tuple[MeshPart, ...]]
@@ -177,6 +177,11 @@ def opened(object_class: str, parts: tuple[MeshPart, ...], openness: Mapping[str
         for p in thing.parts[m.name]:
             out.append(dataclasses.replace(p, vertices=p.vertices @ turn.T + shift, normals=p.normals @ turn.T))
     return tuple(out)
+
+
+def closed(params: Sequence[tuple[str, str | float]]) -> tuple[tuple[str, str | float], ...]:
+    """The params of a placement without those that say how far it is open."""
+    return tuple(x for x in params if not x[0].startswith(OPEN))
 
 
 def openness_of(params: Sequence[tuple[str, str | float]]) -> dict[str, float]:
@@ -321,7 +326,7 @@ def _hung(
         kind, axis, origin = "door", [0, 0, -np.sign(off)], [x0 if off > 0 else x1, face, (z0 + z1) / 2]
     else:
         kind, axis, origin = "drawer", [0, -1.0, 0], front.mean(0).tolist()
-    reach = REACH.get(kind, PULL * float(inside[1, 1] - back))
+    reach = FULL_TURN.get(kind, PULL * float(inside[1, 1] - back))
     return MovingPart(kind, kind, np.array(axis), np.array(origin), reach, front, handle, inside, pieces, cut)
 
 
@@ -338,7 +343,7 @@ def _lids(s: _Pieces) -> list[MovingPart]:
     handle = np.array([[x - 0.05, a[1], a[2]], [x + 0.05, a[1] + 0.02, b[2]]])
     pieces, hinge = np.flatnonzero(_within(s, front, ROUND_ABOUT)), np.array([x, b[1], b[2]])
     none, axis = np.array([b, b]), np.array([-1.0, 0, 0])
-    return [MovingPart("lid", "lid", axis, hinge, REACH["lid"], front, handle, none, pieces, False)]
+    return [MovingPart("lid", "lid", axis, hinge, FULL_TURN["lid"], front, handle, none, pieces, False)]
 
 
 def _named(parts: Sequence[MovingPart]) -> list[MovingPart]:
@@ -376,7 +381,7 @@ def cut_open(
     source = np.arange(len(faces))
     for ways, far in holes:
         over = rows[faces, :3] @ ways.T - far
-        outside, inside = (over > 0).all(1).any(1), (over <= 0).all((1, 2))
+        outside, inside = np.any((over > 0).all(1), axis=1), np.all(over <= 0, axis=(1, 2))
         pieces: list[np.ndarray] = []
         cut: list[int] = []
         for k in np.flatnonzero(~(outside | inside)):
@@ -384,7 +389,7 @@ def cut_open(
             for way, end in zip(ways, far, strict=True):
                 apart, rest = _halves(rest, way, float(end))
                 pieces += [apart[[0, i, i + 1]] for i in range(1, len(apart) - 1)]
-                cut += [k] * max(len(apart) - 2, 0)
+                cut += [int(k)] * max(len(apart) - 2, 0)
                 if len(rest) < 3:
                     break
         own = np.arange(3 * len(pieces)).reshape(-1, 3) + len(rows)
@@ -396,7 +401,9 @@ def cut_open(
 
 def _halves(polygon: np.ndarray, way: np.ndarray, far: float) -> Corners:
     """The parts of a convex polygon, (k, 3 and more), that lie farther along a way than `far`, and not."""
-    over, apart, rest = polygon[:, :3] @ way - far, [], []
+    apart: list[np.ndarray] = []
+    rest: list[np.ndarray] = []
+    over = polygon[:, :3] @ way - far
     for k, a in enumerate(over):
         here, following, b = polygon[k], polygon[(k + 1) % len(over)], over[(k + 1) % len(over)]
         (apart if a > 0 else rest).append(here)

@@ -18,7 +18,7 @@ from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.house.house import House
 from embodied.house.lighting import load_lit_house
-from embodied.house.moment import Moment, RigidPose
+from embodied.house.moment import Moment, RigidPose, apart
 from embodied.interface import Sighting
 from embodied.navigation.doors import OPEN_FROM
 from embodied.navigation.graph import NavGraph, build_graph
@@ -29,7 +29,7 @@ from embodied.render.panorama import VFOV36, Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.render.pictures import Baked, PictureSettings, Traced, Unlit, parse_pictures, recorded
 from embodied.render.sightings import FACE, SightingTable, load_table, save_table, sightings_table
-from embodied.scene.house_meshes import Part, apart, house_parts, instance_classes, owners
+from embodied.scene.house_meshes import Part, house_parts, instance_classes, owners
 from embodied.scene.lit_pages import LitPages
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ class World:
     def openable(self) -> tuple[str, ...]:
         """Names of all that `open` takes."""
         doors = (o.id for o in self.house.openings if o.leaf_finish is not None)
-        furniture = ((p.id, apart(self.catalogue, p)) for p in self.house.placements)
+        furniture = ((p.id, apart(self.catalogue.mesh, p)) for p in self.house.placements)
         return (*doors, *(f"{thing}/{m.name}" for thing, whole in furniture if whole for m in whole.moving))
 
     def undo(self) -> None:

@@ -19,13 +19,12 @@ from embodied.assets.moving_parts import OPENING_CLASSES, taken_apart
 from embodied.assets.records import bounds
 from embodied.generate.left_open import free_openness, left_open
 from embodied.house.house import House, HouseError, Placement
-from embodied.house.moment import Moment
+from embodied.house.moment import Moment, apart
 from embodied.house.validation import check_known
 from embodied.light import bake
 from embodied.light.moving import MovingHouse
 from embodied.scene.doors import openness
 from embodied.scene.export import export_mjcf
-from embodied.scene.house_meshes import apart
 from embodied.scene.model import build_spec, takeable
 
 CATALOGUE = load_catalogue()
@@ -61,7 +60,7 @@ def furnished() -> House:
 
 
 HOUSE = furnished()
-PARTS = {f"{p.id}/{m.name}" for p in HOUSE.placements if (x := apart(CATALOGUE, p)) for m in x.moving}
+PARTS = {f"{p.id}/{m.name}" for p in HOUSE.placements if (x := apart(CATALOGUE.mesh, p)) for m in x.moving}
 
 
 @pytest.mark.parametrize("key", EXPECTED)
@@ -85,14 +84,14 @@ def test_every_built_asset_with_handles_opens_and_no_piece_of_it_is_lost():
 
 
 def test_a_drawer_comes_out_straight_and_a_door_ends_at_a_right_angle_within_its_own_width():
-    thing = apart(CATALOGUE, HOUSE.placement_by_id["wardrobe_1"])
+    thing = apart(CATALOGUE.mesh, HOUSE.placement_by_id["wardrobe_1"])
     for m in thing.moving:
         turn, shift = m.turn(1.0)
         there = np.array([c @ turn.T + shift for c in m.box])
         assert np.ptp(there[:, 0]) == pytest.approx(np.ptp(m.box[:, 1]), abs=1e-6)
         assert m.box[0, 0] - 1e-6 < there[:, 0].min() and there[:, 0].max() < m.box[1, 0] + 1e-6
         assert there[:, 1].min() < m.box[0, 1] - 0.4
-    drawer = apart(CATALOGUE, HOUSE.placement_by_id["drawer_cabinet_1"]).moving[0]
+    drawer = apart(CATALOGUE.mesh, HOUSE.placement_by_id["drawer_cabinet_1"]).moving[0]
     turn, shift = drawer.turn(0.5)
     np.testing.assert_allclose(turn, np.eye(3))
     assert shift[1] == pytest.approx(-drawer.reach / 2) and 0.3 < drawer.reach < 0.6

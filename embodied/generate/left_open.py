@@ -11,15 +11,14 @@ import shapely
 from embodied.assets.moving_parts import MovingPart
 from embodied.geometry import rotation
 from embodied.house.house import House, Placement
-from embodied.house.moment import WIDEST, Moment
+from embodied.house.moment import WIDEST, Moment, apart
 from embodied.house.shapes import footprint
-from embodied.scene.house_meshes import apart
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
 
-STEPS = np.linspace(0, 1, 19)[1:]
+OPENNESS_STEPS = np.linspace(0, 1, 19)[1:]
 """Openness that is tried; of doors, every 5 degrees."""
 NEAR = 0.02
 """Metres that things may stand in the way: boxes around them are larger than they are."""
@@ -38,18 +37,18 @@ def free_openness(house: House, catalogue: Catalogue) -> dict[str, float]:
     boxes = [(p, footprint(p), p.position[2], p.position[2] + p.size[2]) for p in house.placements]
     out = {}
     for p in house.placements:
-        whole = apart(catalogue, p)
+        whole = apart(catalogue.mesh, p)
         others = [b for b in boxes if b[0].room == p.room and b[0].id != p.id and b[0].parent != p.id]
         for m in whole.moving if whole is not None else ():
             met = (k for k, front in enumerate(_swept(p, m)) if _meets(front, rooms[p.room], others))
-            out[f"{p.id}/{m.name}"] = float(([0.0, *STEPS])[next(met, len(STEPS))])
+            out[f"{p.id}/{m.name}"] = float(([0.0, *OPENNESS_STEPS])[next(met, len(OPENNESS_STEPS))])
     return out
 
 
 def _swept(p: Placement, m: MovingPart) -> Iterator[tuple[shapely.Geometry, float, float]]:
     """Outline on the floor of a part as it opens, shrunk by NEAR, and its lowest and highest point, metres."""
     corners = np.array(np.meshgrid(*m.box.T)).reshape(3, -1).T
-    for openness in STEPS:
+    for openness in OPENNESS_STEPS:
         turn, shift = m.turn(openness)
         there = corners @ turn.T + shift
         outline = shapely.MultiPoint(there[:, :2] @ rotation(p.yaw).T + p.position[:2]).convex_hull
@@ -65,8 +64,8 @@ def _meets(front: tuple, room: shapely.Polygon, others: list[tuple]) -> bool:
 
 
 def left_open(house: House, catalogue: Catalogue) -> Moment:
-    """What the household has left open, by the house's seed: drawers, doors and lids of furniture, more of them where
-    it is untidy, and bathroom doors ajar. `left_open(house, catalogue).applied(house)` is such a house."""
+    """All that the household has left open, by the house's seed: doors and drawers of furniture, more where it is
+    untidy, and bathroom doors ajar. `left_open(house, catalogue).applied(house)` is such a house."""
     openness: dict[str, float] = {}
     kinds = {r.id: r.kind for r in house.rooms}
     for o in house.openings:

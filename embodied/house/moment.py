@@ -5,14 +5,15 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from embodied.assets.moving_parts import OPEN, openness_of
+from embodied.assets.moving_parts import OPEN, TakenApart, closed, openness_of, taken_apart
+from embodied.assets.records import MeshPart
 from embodied.geometry import rotation
 from embodied.house.house import House, HouseError, Placement
 from embodied.house.shapes import room_at
@@ -167,6 +168,15 @@ def carried(root: Placement, pose: RigidPose, p: Placement) -> RigidPose:
     quat = (w * cos - c * sin, a * cos + b * sin, b * cos - a * sin, c * cos + w * sin)
     at_x, at_y, at_z = pose.points(local[None])[0].tolist()
     return RigidPose((at_x, at_y, at_z), quat)
+
+
+def apart(mesh: Callable[..., tuple[MeshPart, ...]], p: Placement) -> TakenApart | None:
+    """A placement, closed, with its moving parts apart; None where nothing of it moves.
+
+    Args:
+      mesh: Catalogue.mesh.
+    """
+    return taken_apart(p.object_class, mesh(p.asset, p.size, closed(p.params)))
 
 
 def _opened(p: Placement, openness: Mapping[str, float]) -> Placement:

@@ -19,7 +19,7 @@ import numpy as np
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.moving_parts import TakenApart, openness_of
 from embodied.house.house import House
-from embodied.house.moment import WIDEST, Moment, RigidPose
+from embodied.house.moment import WIDEST, Moment, RigidPose, apart
 from embodied.house.shapes import room_at
 from embodied.light.movers import (
     DISCS,
@@ -48,7 +48,7 @@ from embodied.light.tracing.rays import rays_among
 from embodied.light.tracing.sky import sun_direction, sun_height, sun_strength
 from embodied.render.gloss import GlossData
 from embodied.scene.cupboards import lit_apart
-from embodied.scene.house_meshes import apart, object_parts
+from embodied.scene.house_meshes import object_parts
 from embodied.scene.joinery import opening_parts
 from embodied.scene.lit_pages import ANYWHERE, LitMesh, LitPages
 from embodied.scene.part import Part
@@ -72,7 +72,7 @@ UNKNOWN_BELOW, KNOWN_FROM = 0.5, 0.92
 gone, and above which it says all."""
 BRIGHT = (0.3, 2.0)
 """Bounds of how bright what a thing hides is, beside the rest: nine harmonics are no more sure of one direction."""
-INSIDE = "/"
+INSIDE_NAME = "/"
 """End of the name of the inside of a thing that is open; before the name of a part of it stands the same."""
 BEFORE = 0.15
 """Metres before the front of a thing from which its inside has its light."""
@@ -148,19 +148,19 @@ class MovingHouse:
                         name = f"{o.id}@{'+' if '/+1' in p.mesh_key else '-'}"
                         out[name] = RigidPose.upright(p.position, p.yaw)
         for thing, openness in moment.open_parts(self.house).items():
-            p = self.house.placement_by_id[thing]
-            if moment.carrier(self.house, p) is not None:
+            placement = self.house.placement_by_id[thing]
+            if moment.carrier(self.house, placement) is not None:
                 raise ValueError(f"{thing!r} was moved; its doors and drawers open where it stands at rest only")
-            whole, rest = self._apart(thing), RigidPose.upright(p.position, p.yaw)
+            whole, rest = self._apart(thing), RigidPose.upright(placement.position, placement.yaw)
             assert whole is not None, "checked by World.show"
-            out[thing + INSIDE] = rest
+            out[thing + INSIDE_NAME] = rest
             for m in whole.moving:
                 if m.name in openness:
                     out[f"{thing}/{m.name}"] = rest.then(*m.turn(openness[m.name]))
         return out | dict(moment.bodies)
 
     def _apart(self, thing: str) -> TakenApart | None:
-        return apart(self.catalogue, self.house.placement_by_id[thing])
+        return apart(self.catalogue.mesh, self.house.placement_by_id[thing])
 
     def show(self, moment: Moment, *, slack: float = 0.0) -> SceneChange:
         """Bring everything to a moment.
@@ -261,8 +261,8 @@ class MovingHouse:
         assert whole is not None, "checked by World.show"
         at = RigidPose.upright(p.position, p.yaw)
         still, source, label = lit_apart(m, p, whole)
-        gone = [k for k, part in enumerate(whole.moving) if f"{m.owner}/{part.name}" in self._things]
-        others = np.flatnonzero((label >= 0) & ~np.isin(label, gone))
+        parted = [k for k, part in enumerate(whole.moving) if f"{m.owner}/{part.name}" in self._things]
+        others = np.flatnonzero((label >= 0) & ~np.isin(label, parted))
         faces = np.concatenate([still.faces, m.faces[others]])
         both = dataclasses.replace(still, vertices=at.points(still.vertices), faces=faces)
         return both, np.concatenate([source, others])
@@ -270,7 +270,7 @@ class MovingHouse:
     def _lit_at(self, things: Mapping[str, tuple[Surface, RigidPose]]) -> dict[str, Placed]:
         """Things where they are to be, and the light on them."""
         placed = {
-            name: Placed(s, pose, pose, self._soft_light(s, pose, name.endswith(INSIDE)))
+            name: Placed(s, pose, pose, self._soft_light(s, pose, name.endswith(INSIDE_NAME)))
             for name, (s, pose) in things.items()
         }
         if not len(self._portals) or not placed:
@@ -494,7 +494,7 @@ class MovingHouse:
         self._sunlit = {}
         for name in names:
             thing = self._things[name]
-            if thing.surface is None or thing.rest is None or name.endswith(INSIDE):
+            if thing.surface is None or thing.rest is None or name.endswith(INSIDE_NAME):
                 continue
             placed = self._lit_at({name: (thing.surface, thing.rest)})[name]
             low, high = placed.box
@@ -555,7 +555,7 @@ class MovingHouse:
         """Tiles whose light is not what was shown last."""
         groups: dict[str, list[Placed]] = {}
         for name, placed in self._placed.items():
-            if name.endswith(INSIDE):  # it hides no more than the thing does
+            if name.endswith(INSIDE_NAME):  # it hides no more than the thing does
                 continue
             groups.setdefault(BODIES if self._things[name].rest is None else name, []).append(placed)
         moved = [n for n, g in groups.items() if n not in self._hiding or not self._hiding[n].holds(g, slack)]

@@ -19,10 +19,11 @@ from scipy.spatial.transform import Rotation
 
 from embodied.assets.moving_parts import FIXED, TakenApart, boards_of, cut_open, openness_of
 from embodied.house.house import House, Placement
+from embodied.house.moment import apart
 from embodied.scene import collision
 from embodied.scene.collision import CollisionBox
 from embodied.scene.doors import LEAF_DENSITY, Hung
-from embodied.scene.house_meshes import Meshes, apart
+from embodied.scene.house_meshes import Meshes
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 
@@ -57,7 +58,7 @@ def hang(spec: mujoco.MjSpec, house: House, catalogue: Meshes, without: frozense
     Returns:
       Them by placement id.
     """
-    known = ((p, apart(catalogue, p)) for p in house.placements if p.id not in without)
+    known = ((p, apart(catalogue.mesh, p)) for p in house.placements if p.id not in without)
     return {p.id: _case(spec, p, whole) for p, whole in known if whole is not None}
 
 
@@ -132,8 +133,8 @@ def parts_of(case: Case, *, hidden: bool = False) -> Iterator[tuple[Part, Hung]]
 
 
 def lit_apart(m: LitMesh, p: Placement, whole: TakenApart) -> tuple[LitMesh, np.ndarray, np.ndarray]:
-    """What stands still of a lit mesh of furniture, cut open, in the thing's frame, its own vertices first; of its
-    faces, the numbers that they had; and the labels of all faces that there were."""
+    """The part of a lit mesh of furniture that stands still, cut open, in the thing's frame, with its old vertices
+    first; of its faces, the numbers that they had; and the labels of all faces that there were."""
     c, s = math.cos(p.yaw), math.sin(p.yaw)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], np.float32)
     local = (m.vertices - np.asarray(p.position, np.float32)) @ turn

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import typing
 
-from embodied.assets.moving_parts import OPEN, TakenApart, taken_apart
 from embodied.assets.records import Finish, MeshPart
-from embodied.house.house import House, Placement
+from embodied.house.house import House
 from embodied.scene.part import Part
 from embodied.scene.shell import shell_owners, shell_parts
 
@@ -36,12 +35,6 @@ def object_parts(house: House, catalogue: Meshes) -> tuple[Part, ...]:
         for i, mesh in enumerate(catalogue.mesh(p.asset, p.size, p.params)):
             parts.append(Part(p.id, "object", p.room, mesh, f"{stem}#{i}", p.position, p.yaw))
     return tuple(parts)
-
-
-def apart(catalogue: Meshes, p: Placement) -> TakenApart | None:
-    """A placement, closed, with its moving parts apart; None where nothing of it moves."""
-    closed = tuple(x for x in p.params if not x[0].startswith(OPEN))
-    return taken_apart(p.object_class, catalogue.mesh(p.asset, p.size, closed))
 
 
 def owners(house: House) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ import cv2
 import mujoco
 import numpy as np
 
-from embodied.assets.moving_parts import OPEN
+from embodied.assets.moving_parts import closed
 from embodied.assets.records import Finish, MeshPart
 from embodied.geometry import rotation
 from embodied.house.house import House, Placement
@@ -51,7 +51,7 @@ PIECES = 24
 PROBE_LIT = "lit_by_probes"
 """Material of a lit house for the bodies that are added to it: they shine in the colour of their light
 (embodied.light.viewer)."""
-INSIDE = 0.5
+INSIDE_DIM = 0.5
 """Brightness of insides in a lit house, where no probes light them."""
 OFFSCREEN = 1024
 """Side of the off-screen buffer: the largest picture, pixels."""
@@ -200,6 +200,7 @@ def build_spec(
     else:
         spec.visual.headlight.active = 0
         spec.add_material(name=PROBE_LIT, emission=1.0, specular=0.0, shininess=0.0)
+        frames: dict[str, tuple[Part | Placement, Hung]]
         frames = {p.owner: (p, hung[p.owner, p.yaw]) for p in shell if doors.is_leaf(p) and (p.owner, p.yaw) in hung}
         frames |= {p: (house.placement_by_id[p], body) for p, body in bodies.items()}
         _add_pages(spec, lit, house, lambda m: _lit_pieces(m, frames, cases))
@@ -446,12 +447,12 @@ def _lit_pieces(
 
 
 def _add_insides(spec: mujoco.MjSpec, cases: Mapping[str, Case]) -> None:
-    """What closed furniture hides, which was not lit: in a plain colour, as bodies that are added to a lit house."""
+    """Draw insides of closed furniture, which were not lit, in a plain colour, as bodies added to a lit house."""
     hidden = (x for case in cases.values() for x in cupboards.parts_of(case, hidden=True))
     for k, (part, carrier) in enumerate(hidden):
         mesh, (r, g, b, alpha) = f"inside_{k}", part.mesh.finish.color
         _add_mesh(spec, mesh, part.mesh.vertices, part.mesh.normals, part.mesh.uv, part.mesh.faces)
-        color = (INSIDE * r, INSIDE * g, INSIDE * b, alpha)
+        color = (INSIDE_DIM * r, INSIDE_DIM * g, INSIDE_DIM * b, alpha)
         _draw(carrier.body, f"{part.owner}#inside{k}", mesh, PROBE_LIT, color, pos=carrier.origin)
 
 
@@ -506,9 +507,9 @@ def _add_collisions(
             continue
         density = collision.density_of(catalogue.assets[p.asset])
         if p.id in cases:
-            closed = dataclasses.replace(p, params=tuple(x for x in p.params if not x[0].startswith(OPEN)))
-            boxes = cupboards.boxes_of(cases[p.id], density, placement_boxes(catalogue, closed))
-            for k, (carrier, box, heavy) in enumerate(boxes):
+            shut = dataclasses.replace(p, params=closed(p.params))
+            pieces = cupboards.boxes_of(cases[p.id], density, placement_boxes(catalogue, shut))
+            for k, (carrier, box, heavy) in enumerate(pieces):
                 _add_boxes(carrier.body, p.id, [box], density=heavy, position=carrier.origin, first=k)
             continue
         key = (p.asset, p.size, p.params)
