@@ -93,6 +93,7 @@ class World:
         self._followed: mujoco.MjModel | None = None
         self._lender: World | None = None
         self._states: dict[tuple[tuple[str, float], ...], Self] = {}
+        self._lamps: tuple[tuple[bool, ...], Mapping[str, str]] = (), {}
         self._recent = functools.lru_cache(maxsize=PANORAMAS_KEPT)(self._load)
 
     @property
@@ -139,8 +140,22 @@ class World:
         furniture = ((p.id, apart(self.catalogue.mesh, p)) for p in self.house.placements)
         return (*doors, *(f"{thing}/{m.name}" for thing, whole in furniture if whole for m in whole.moving))
 
+    def switch(self, lamp: str, on: bool) -> None:
+        """Turn a lamp on or off; `undo` takes it back. The house is lit once more where it never had these lamps on.
+
+        Args:
+          lamp: id of a light, or of the placement whose lights are all meant.
+
+        Raises:
+          ValueError: the house has no such lamp.
+        """
+        lights = [x.id for x in self.house.lights if lamp in (x.id, x.placement)]
+        lamps = {**self.moment.lamps, **dict.fromkeys(lights or [lamp], bool(on))}
+        self._moments.append(self.moment)
+        self.show(dataclasses.replace(self.moment, lamps=lamps))
+
     def undo(self) -> None:
-        """Go back to the moment before the last `move` or `open`; nothing where there was none."""
+        """Go back to the moment before the last `move`, `open` or `switch`; nothing where there was none."""
         if len(self._moments) > 1:
             self._moments.pop()
             self._bring_up_to_date()
@@ -168,7 +183,7 @@ class World:
         bodies = {name: pose for name, pose in poses.items() if name in self._bodies}
         moved = {name: pose for name, pose in poses.items() if name not in self._bodies}
         opened = {**self.moment.openness, **openness(model, data)}
-        self._moments[-1] = Moment({**self.moment.moved, **moved}, opened, bodies)
+        self._moments[-1] = Moment({**self.moment.moved, **moved}, opened, bodies, self.moment.lamps)
         self._bring_up_to_date(slack=SLACK)
 
     def show(self, moment: Moment, *, slack: float = 0.0) -> None:
@@ -244,20 +259,37 @@ class World:
             self._renderer = self._moving = None
             return
         renderer = self.renderer
-        if self._moving is None:
-            from embodied.light.moving import MovingHouse  # late: loads the path tracer
-
-            self._moving = MovingHouse(self.baked(), self.house, self.catalogue, self.cache)
+        fresh = self._light_for_moment()
         moving = self._moving
+        assert moving is not None  # made by the line above
         for name, parts in self._bodies.items():
             moving.add(name, parts)
-        anew = moving.needs(self.moment)
+        anew = fresh or moving.needs(self.moment)
         drawn = moving.show(self.moment, slack=slack)
         patches = [(p.page, p.row, p.column, p.picture) for p in drawn.patches]
         if anew:
-            overlay = gloss_of(self.baked(), moving=moving) if _reflects(self.pictures) else None
+            overlay = gloss_of(moving.bake, moving=moving) if _reflects(self.pictures) else None
             renderer.replace(moving.lit, moving.moving, (*self.owners, *self._bodies), overlay)
         renderer.change(drawn.corners, patches)
+
+    def _light_for_moment(self) -> bool:
+        """Make what moves anew where other lamps are on, or carried, than before; True where that was so."""
+        from embodied.light import bake  # late: these load the path tracer
+        from embodied.light.carried import carried_lamps
+        from embodied.light.moving import MovingHouse
+
+        carriers = carried_lamps(self.house, self.moment)
+        lamps = tuple(x.on for x in self.moment.switched(self.house).lights), carriers
+        if self._moving is not None and lamps == self._lamps:
+            return False
+        self._lamps = lamps
+        lit = self.moment.switched(self.house)
+        house, quality = (self.house if lit == self.house else lit), self.pictures.quality or "normal"
+        light = self.baked() if house is self.house else bake(house, self.catalogue, self.cache, quality)
+        off = Moment(lamps={**self.moment.lamps, **dict.fromkeys(carriers, False)}).switched(self.house)
+        dark = bake(off, self.catalogue, self.cache, quality) if carriers else None
+        self._moving = MovingHouse(light, house, self.catalogue, self.cache, carriers=carriers, dark=dark)
+        return True
 
     def __reduce__(self) -> tuple[Callable[[], World], tuple[()]]:
         """Pickled as what it was made of; nothing is open in the process that reads it."""
@@ -343,7 +375,8 @@ class World:
         the house is not lit."""
         if self.pictures.quality is None:
             return 1.0
-        return float(self.baked().exposure.at(np.asarray(position, float)[None]).mean())
+        shown = self.baked() if self._moving is None else self._moving.bake
+        return float(shown.exposure.at(np.asarray(position, float)[None]).mean())
 
     @property
     def renderer(self) -> Renderer:

@@ -228,6 +228,52 @@ def test_pages_for_others_are_those_that_are_drawn(world):
     assert decibels(shown.rgb, again.rgb) > 45
 
 
+@pytest.fixture(scope="module")
+def evening(tmp_path_factory):
+    """The house at night, lit by a ceiling lamp and by one that stands on something; both are bare bulbs."""
+    stand = SUNNY.placement_by_id[thing()]
+    above = tuple(np.add(stand.position, (0, 0, stand.size[2] + 0.5)))
+    lamp = Light("bulb", stand.room, stand.id, above, (1.0, 0.7, 0.4), 900.0)
+    house = dataclasses.replace(SUNNY, lights=(*SUNNY.lights, lamp), sky=Sky(23.0, "clear"))
+    with World(house, HandCatalogue(), build_graph(SUNNY), tmp_path_factory.mktemp("evening"), _tiny()) as w:
+        yield w, stand
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_a_lamp_that_is_switched_off_gives_the_picture_of_a_house_without_its_light(evening):
+    world, stand = evening
+    world.switch(stand.id, False)
+    off = world.camera(*CAMERA).rgb
+    dark = world.moment.applied(world.house)
+    assert [x.on for x in dark.lights] == [True, False]
+    with World(dark, HandCatalogue(), world.graph, world.cache, _tiny()) as other:
+        np.testing.assert_array_equal(off, other.camera(*CAMERA).rgb)
+    world.undo()
+    assert np.abs(world.camera(*CAMERA).rgb.astype(int) - off).mean() > 2
+    with pytest.raises(ValueError, match="no lights.*moon"):
+        world.switch("moon", True)
+    world.undo()
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_a_carried_lamp_takes_its_light_along(evening):
+    world, stand = evening
+    there = (1.2, 3.2, 0.0) if stand.position[0] > 2.5 else (4.2, 3.2, 0.0)
+    world.switch("l1", False)
+    wall = lambda x: world.camera((x, 2.4, 1.2), math.pi / 2, 0.0, 0.9, (64, 64)).rgb[:24].astype(float).mean()
+    before = [wall(x) for x in (there[0], 5 - there[0])]
+    world.move(stand.id, there)
+    after = [wall(x) for x in (there[0], 5 - there[0])]
+    assert after[0] > before[0] + 10 and after[0] > after[1] + 10
+    truth = world.moment.applied(world.house)
+    assert math.dist(truth.lights[1].position[:2], there[:2]) < 1e-6
+    world.undo()
+    world.undo()
+    assert world.moment.is_rest
+
+
 @pytest.mark.slow
 @pytest.mark.gl
 def test_a_mirror_shows_a_thing_that_moves_before_it(world):

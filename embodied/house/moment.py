@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from embodied.assets.moving_parts import OPEN, TakenApart, closed, openness_of, taken_apart
 from embodied.assets.records import MeshPart
 from embodied.geometry import rotation
-from embodied.house.house import House, HouseError, Placement
+from embodied.house.house import House, HouseError, Light, Placement
 from embodied.house.shapes import room_at
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -72,6 +72,10 @@ class RigidPose:
         """(n, 3) world metres of points (n, 3) of the thing's frame."""
         return local @ self.rotation.T.astype(local.dtype) + np.asarray(self.position, local.dtype)
 
+    def local(self, points: np.ndarray) -> np.ndarray:
+        """(n, 3) of the thing's frame, of points (n, 3) of the world."""
+        return (points - np.asarray(self.position, points.dtype)) @ self.rotation.astype(points.dtype)
+
 
 @dataclass(frozen=True)
 class Moment:
@@ -88,11 +92,13 @@ class Moment:
     """By opening id, or by placement id and part, 'wardrobe_1/left_door': 0 is closed, 1 open, of doors by WIDEST."""
     bodies: Mapping[str, RigidPose] = field(default_factory=dict)
     """By name: things that are no part of the house, such as the links of a robot."""
+    lamps: Mapping[str, bool] = field(default_factory=dict)
+    """By light id: on or off."""
 
     @property
     def is_rest(self) -> bool:
         """True where nothing differs."""
-        return not (self.moved or self.openness or self.bodies)
+        return not (self.moved or self.openness or self.bodies or self.lamps)
 
     def check(self, house: House) -> None:
         """Refuse a moment of another house.
@@ -105,6 +111,7 @@ class Moment:
         for kind, names, known in (
             ("things", {*self.moved, *furniture}, house.placement_by_id),
             ("doors or windows", {o for o in self.openness if "/" not in o}, doors),
+            ("lights", self.lamps, {x.id for x in house.lights}),
         ):
             if unknown := sorted(set(names) - set(known)):
                 raise ValueError(f"house {house.name!r} has no {kind} {unknown}; it has {sorted(known)[:8]} ...")
@@ -127,6 +134,11 @@ class Moment:
             if (root := self.carrier(house, p)) is not None:
                 out[p.id] = carried(house.placement_by_id[root], self.moved[root], p)
         return out
+
+    def switched(self, house: House) -> House:
+        """The house at rest, its lamps as they are at this moment."""
+        lights = [dataclasses.replace(x, on=self.lamps.get(x.id, x.on)) for x in house.lights]
+        return dataclasses.replace(house, lights=tuple(lights))
 
     def carrier(self, house: House, p: Placement) -> str | None:
         """Id of the moved placement that carries `p`: itself, or the nearest below it; None where it rests."""
@@ -153,7 +165,8 @@ class Moment:
             dataclasses.replace(o, angle=self.openness[o.id] * WIDEST) if o.id in self.openness else o
             for o in house.openings
         ]
-        return dataclasses.replace(house, placements=tuple(placements), openings=tuple(openings))
+        lights = [_shining(house, x, poses) for x in self.switched(house).lights]
+        return dataclasses.replace(house, placements=tuple(placements), openings=tuple(openings), lights=tuple(lights))
 
 
 def carried(root: Placement, pose: RigidPose, p: Placement) -> RigidPose:
@@ -184,6 +197,15 @@ def _opened(p: Placement, openness: Mapping[str, float]) -> Placement:
     return dataclasses.replace(
         p, params=tuple(sorted((k, v) for k, v in params.items() if v or not k.startswith(OPEN)))
     )
+
+
+def _shining(house: House, light: Light, poses: Mapping[str, RigidPose]) -> Light:
+    """A light, where its lamp is now."""
+    if light.placement not in poses:
+        return light
+    p, pose = house.placement_by_id[light.placement], poses[light.placement]
+    x, y, z = pose.points(RigidPose.upright(p.position, p.yaw).local(np.array([light.position])))[0].tolist()
+    return dataclasses.replace(light, position=(x, y, z), room=room_at(house, (x, y, z)) or light.room)
 
 
 def _placed(house: House, p: Placement, pose: RigidPose) -> Placement:

@@ -98,6 +98,8 @@ class Surface:
     """(n, 3) float32."""
     glow: np.ndarray
     """(n, 3) float32 radiance that it gives off."""
+    of_lamps: np.ndarray
+    """(n,) bool: that is the light of a lamp, which is asked for by itself."""
     transfer: np.ndarray
     """(n, 9) float32: with coefficients of the incoming radiance in this frame, the luxel's e."""
     corners: np.ndarray
@@ -175,15 +177,16 @@ def surface_of(
         lux.thin,
         lux.albedo,
         lux.glow,
+        lux.sampled,
         unhidden(lux.normal, lux.thin),
         corners,
-        _discs(lux.position, lux.face_normal, lux.thin, lux.area),
+        discs_of(lux.position, lux.face_normal, lux.thin, lux.area),
     )
     if not len(corners):
         return plain
     face = np.concatenate([t.face + first for t, first in zip(lux.texels, _firsts(atlas.pages), strict=True)])
     transfer, open_ = _transfer(plain, lux.face_normal, face)
-    discs = _discs(lux.position, lux.face_normal, lux.thin, lux.area * open_)
+    discs = discs_of(lux.position, lux.face_normal, lux.thin, lux.area * open_)
     return dataclasses.replace(plain, transfer=transfer, discs=discs)
 
 
@@ -250,7 +253,7 @@ def _cosine_directions(normal: np.ndarray, u: np.ndarray) -> np.ndarray:
     return ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
 
 
-def _discs(position: np.ndarray, normal: np.ndarray, thin: np.ndarray, area: np.ndarray) -> Discs:
+def discs_of(position: np.ndarray, normal: np.ndarray, thin: np.ndarray, area: np.ndarray) -> Discs:
     """Discs of one size at luxels, spread evenly over the area, neighbours in a row along x, y and z in turn."""
     low = position.min(0)
     cells = ((position - low) / max(float(np.ptp(position, axis=0).max()), 1e-6) * 1023).astype(np.int64)
@@ -310,7 +313,7 @@ def cloud_of(things: Sequence[Placed], most: int) -> Cloud:
         some = np.minimum(np.arange(len(starts)) * step + min(step, len(d.area)) // 2, len(d.area) - 1)
         area = np.add.reduceat(d.area, np.arange(0, len(d.area), step)).astype(np.float32)
         normal = d.normal[some] @ t.pose.rotation.T.astype(np.float32)
-        radiosity = (s.albedo * t.e + s.glow)[d.luxels] * d.weight[:, None]
+        radiosity = (s.albedo * t.e + s.glow * ~s.of_lamps[:, None])[d.luxels] * d.weight[:, None]
         sent = np.add.reduceat(radiosity, starts) / np.add.reduceat(d.weight, starts)[:, None]
         rows.append((t.pose.points(d.position[some]), normal, d.thin[some], area, sent))
     return Cloud(*(np.concatenate(column) for column in zip(*rows, strict=True)))
@@ -378,22 +381,29 @@ def hidden_share(thing: Placed, position: np.ndarray, normal: np.ndarray) -> np.
     return met / HIDING_RAYS
 
 
-def hidden_by(placed: Placed, start: np.ndarray, towards: np.ndarray) -> np.ndarray:
-    """(n,) bool: a thing stands between points and the sun."""
+def hidden_by(placed: Placed, start: np.ndarray, towards: np.ndarray, reach: np.ndarray | float = np.inf) -> np.ndarray:
+    """(n,) bool: a thing stands between points and what they look at.
+
+    Args:
+      start: (n, 3) metres, world.
+      towards: (3,) or (n, 3) unit.
+      reach: (n,) metres up to which it may stand; without end for the sun.
+    """
     turn = placed.pose.rotation.astype(np.float32)
-    local, ahead = (start - np.asarray(placed.pose.position, np.float32)) @ turn, towards @ turn
+    local = (start - np.asarray(placed.pose.position, np.float32)) @ turn
+    ahead = np.broadcast_to((towards @ turn).astype(np.float32), local.shape)
     low, high = placed.surface.box
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         steep = 1 / ahead
-    begin, end = (low - local) * steep, (high - local) * steep
+        begin, end = (low - local) * steep, (high - local) * steep
     first, last = np.fmin(begin, end), np.fmax(begin, end)
     near = np.maximum(np.maximum(first[:, 0], first[:, 1]), first[:, 2])
     far = np.minimum(np.minimum(last[:, 0], last[:, 1]), last[:, 2])
-    out: np.ndarray = (near <= far) & (far > 0)
+    out: np.ndarray = (near <= far) & (far > 0) & (near < reach)
     which = np.flatnonzero(out)
     if len(which) and len(placed.surface.corners):
-        along = np.broadcast_to(ahead, (len(which), 3)).astype(np.float32)
-        out[which] = placed.surface.first_hit(local[which], along)[0] >= 0
+        hit, met, _, _ = placed.surface.first_hit(local[which], ahead[which])
+        out[which] = (hit >= 0) & (met < np.broadcast_to(reach, len(out))[which])
     return out
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from embodied.assets.moving_parts import TakenApart, openness_of
 from embodied.house.house import House
 from embodied.house.moment import WIDEST, Moment, RigidPose, apart
 from embodied.house.shapes import room_at
+from embodied.light.carried import Blocked, SentBack, by_carrier, direct, fitting_of, lamp_at, sent_back
 from embodied.light.movers import (
     DISCS,
     Placed,
@@ -40,13 +41,14 @@ from embodied.light.pages.colours import linear
 from embodied.light.pages.files import Bake
 from embodied.light.pages.gloss_data import gloss_data_of
 from embodied.light.pages.tone import displayed, shown_table
+from embodied.light.pages.unwrap import areas_of
 from embodied.light.probes import CORNERS, harmonics, radiance, turned
 from embodied.light.settings import LightSettings
 from embodied.light.tiles import HALF_TILE, SAMPLES, TILE, Receiver, Tile, blocks_of, filled, luxels_in, read_receiver
-from embodied.light.tracing.emitters import GLAZING, portals_of, read_lamps
+from embodied.light.tracing.emitters import GLAZING, Lamp, portals_of, read_lamps
 from embodied.light.tracing.rays import rays_among
 from embodied.light.tracing.sky import sun_direction, sun_height, sun_strength
-from embodied.render.gloss import GlossData
+from embodied.render.gloss import GlossData, Rays
 from embodied.scene.cupboards import lit_apart
 from embodied.scene.house_meshes import object_parts
 from embodied.scene.joinery import opening_parts
@@ -59,8 +61,10 @@ SLIGHT, SLIGHT_MOVING = 0.01, 0.03
 """Change of the share of its light that a place gets which goes unnoticed, in a picture and in one of many."""
 NEARBY = 0.05
 """Share hidden by the discs of a thing from which on rays are asked what it hid where it was baked."""
-BODIES = "*"
-"""Name of the group of all that is no part of the house."""
+BODIES, LAMPS = "*", "+"
+"""Names of the groups of all that is no part of the house, and of all that changes the light of carried lamps."""
+DARKER = 1e-3
+"""e that goes unnoticed, of a lamp that is carried elsewhere."""
 BODY_LUXELS = 0.25
 """Luxels of a body, of those of a piece of furniture: robots have many."""
 FEW_FROM, FEW_DISCS = 0.3, 12
@@ -103,12 +107,24 @@ class SceneChange:
 class MovingHouse:
     """Owns what has moved so far, its surfaces, and the light of the pages that changed."""
 
-    def __init__(self, bake: Bake, house: House, catalogue: Catalogue, cache: Path) -> None:
+    def __init__(
+        self,
+        bake: Bake,
+        house: House,
+        catalogue: Catalogue,
+        cache: Path,
+        *,
+        carriers: Mapping[str, str] = {},
+        dark: Bake | None = None,
+    ) -> None:
         """
         Args:
           cache: the folder that everything expensive is kept in.
+          carriers: what carries a lamp that is on, by light id (embodied.light.carried.carried_lamps).
+          dark: the house with these lamps off, where there are any.
         """
         self.bake, self.house, self.catalogue = bake, house, catalogue
+        self._dark = dark or bake
         self._cache = Path(cache) / "light"
         self._settings = LightSettings(**bake.manifest["settings"])
         self._things: dict[str, _Thing] = {}
@@ -122,8 +138,14 @@ class MovingHouse:
         self._shown_things: dict[str, np.ndarray] = {}
         self._drawn_at: dict[str, RigidPose] = {}
         self._sunlit: dict[int, np.ndarray] = {}
+        self._lamp_tiles: dict[str, _Hides] = {}
         self._extra: dict[str, tuple[Part, ...]] = {}
         self._lamps = read_lamps(bake.folder / "lamps.npz", bake.manifest["lamps"])
+        self._carried = by_carrier({x.id: x for x in self._lamps}, carriers)
+        for root, lamps in self._carried.items():
+            self._carried[root] = [*lamps, *(f for x in lamps if (f := self._fitting(x)) is not None)]
+        self._burning: list[tuple[Lamp, Blocked]] = []
+        self._sent_back: dict[str, SentBack] = {}
         towards = sun_direction(house.sky)
         self._sun = (sun_strength(house.sky, sun_height(house.sky.hour)) * GLAZING).astype(np.float32)
         self._towards = towards.astype(np.float32)
@@ -182,6 +204,7 @@ class MovingHouse:
             self.__dict__.pop("lit", None)
             self._shown, self._shown_things, self._drawn_at = {}, {}, {}
             self._take_out(new)
+        shining = self._shine(wanted, slack)
         unlit = {}
         for name, thing in self._things.items():
             pose = wanted.get(name, thing.rest)
@@ -189,7 +212,7 @@ class MovingHouse:
                 self._placed.pop(name, None)
             elif thing.surface is not None:
                 known = self._placed.get(name)
-                if known is None or known.lit_at.apart(pose) > slack:
+                if known is None or shining or known.lit_at.apart(pose) > slack:
                     unlit[name] = thing.surface, pose
                 elif known.pose != pose:
                     self._placed[name] = dataclasses.replace(known, pose=pose)
@@ -270,7 +293,9 @@ class MovingHouse:
     def _lit_at(self, things: Mapping[str, tuple[Surface, RigidPose]]) -> dict[str, Placed]:
         """Things where they are to be, and the light on them."""
         placed = {
-            name: Placed(s, pose, pose, self._soft_light(s, pose, name.endswith(INSIDE_NAME)))
+            name: Placed(
+                s, pose, pose, self._soft_light(s, pose, name.endswith(INSIDE_NAME)) + self._lamplight(s, pose)
+            )
             for name, (s, pose) in things.items()
         }
         if not len(self._portals) or not placed:
@@ -293,7 +318,7 @@ class MovingHouse:
             local[:, 1] = local[:, 1].min() - BEFORE
         corners = pose.points(local)
         middle = corners.mean(0)
-        home = room_at(self.house, middle) or self._nearest_room(middle)
+        home = self._room_around(middle)
         rooms = [room_at(self.house, c) or home for c in corners]
         if set(rooms) == {home}:
             coefficients = self._radiance(corners, home)
@@ -301,13 +326,98 @@ class MovingHouse:
             coefficients = np.concatenate([self._radiance(c[None], room) for c, room in zip(corners, rooms)])
         return shading(s, turned(coefficients, pose.rotation.T).astype(np.float32))
 
+    def _shine(self, wanted: Mapping[str, RigidPose], slack: float) -> bool:
+        """Bring the light that carried lamps send to the house to where they are; False where it stays as it was."""
+        things = [
+            Placed(s, pose, pose, np.zeros((0, 3)))
+            for name, pose in wanted.items()
+            if (s := self._things[name].surface) is not None
+        ]
+        if not self._carried or (LAMPS in self._lamp_tiles and self._lamp_tiles[LAMPS].holds(things, slack)):
+            return False
+        self._burning = []
+        for root, lamps in self._carried.items():
+            rest = self._things[root].rest
+            assert rest is not None  # lamps are things of the house
+            for lamp in (lamp_at(x, rest, wanted[root]) for x in lamps):
+                own = () if lamp.normals.any() else (self._things[root].surface,)
+                self._burning.append((lamp, self._blocked([t for t in things if t.surface not in own])))
+        light = self._shone_on()
+        self._lamp_tiles = {LAMPS: _Hides(tuple(things), light, frozenset(light))}
+        return True
+
+    def _blocked(self, things: Sequence[Placed]) -> Blocked:
+        """Asks whether the house, or one of these things, is in the way."""
+
+        def blocked(start: np.ndarray, ahead: np.ndarray, reach: np.ndarray) -> np.ndarray:
+            hit, far, _, _ = self._static(start, ahead)
+            out: np.ndarray = (hit >= 0) & (far < reach)
+            for placed in things:
+                rest = np.flatnonzero(~out)
+                out[rest] = hidden_by(placed, start[rest], ahead[rest], reach[rest])
+            return out
+
+        return blocked
+
+    def _shone_on(self) -> dict[Tile, np.ndarray]:
+        """Tiles, as `_Hides.tiles`, that carried lamps light, straight and by reflection: of the rooms that they are in
+        and those beside them."""
+        homes = {self._room_around(lamp.points.mean(0)) for lamp, _ in self._burning}
+        rooms = homes | {r for o in self.house.openings if homes & {*o.rooms} for r in o.rooms}
+        near = [(page, self._receiver(page)) for page, room in self._room_of_page.items() if room in rooms]
+        tiles = [np.argwhere(r.low[..., 0] <= r.high[..., 0]) for _, r in near]
+        names = [(page, i, k) for (page, _), own in zip(near, tiles, strict=True) for i, k in own.tolist()]
+        take = lambda what: np.concatenate([getattr(r, what)[tuple(t.T)] for (_, r), t in zip(near, tiles)])
+        some = lambda a: a.reshape(-1, HALF_TILE, HALF_TILE, 3)[:, 1::2, 1::2].reshape(-1, 3)  # soft enough for lamps
+        position, normal = some(take("samples")), some(take("sample_normals"))
+        none = np.zeros(len(position), bool)
+        e = sum(direct(lamp, position, normal, none, blocked) for lamp, blocked in self._burning)
+        albedo = np.repeat([LINEAR[r.held.albedo].mean((0, 1)) for _, r in near], [len(t) for t in tiles], axis=0)
+        area = np.sort(take("high") - take("low"), axis=1)[:, 1:].prod(1) / (SAMPLES // 4)
+        each, self._sent_back = SAMPLES // 4, {}
+        for home in homes:
+            own = np.repeat([self._room_of_page[name[0]] == home for name in names], each)
+            facts = np.repeat(albedo, each, axis=0)[own], position[own], normal[own], np.repeat(area, each)[own]
+            self._sent_back[home] = sent_back(e[own], *facts)
+            e[own] += self._sent_back[home].e(position[own], normal[own])
+        e = e.reshape(-1, HALF_TILE // 2, HALF_TILE // 2, 3)
+        passed, fine = np.ones((HALF_TILE, HALF_TILE, 1), np.float32), (HALF_TILE, HALF_TILE)
+        lit = np.flatnonzero(e.max((1, 2, 3)) > DARKER)
+        return {names[k]: np.dstack([passed, cv2.resize(e[k], fine)]) for k in lit}
+
+    def _fitting(self, lamp: Lamp) -> Lamp | None:
+        """What the lamp itself sends back of its light, where it was baked; None where it has no surface."""
+        owner = next(x.placement for x in self.house.lights if x.id == lamp.id)
+        rows, area = [], 0.0
+        for page in sorted({m.page for m in self.bake.lit.meshes if m.owner == owner and m.page in self._room_of_page}):
+            r = self._receiver(page)
+            own = np.isin(r.mesh, [k for k, m in enumerate(r.meshes) if m.owner == owner])
+            h, w = own.shape
+            albedo = cv2.resize(LINEAR[r.held.albedo], (w, h), interpolation=cv2.INTER_AREA)
+            e = np.maximum(r.held.soft.astype(np.float32) - self._dark.ingredients(page).soft, 0)
+            rows.append((r.position[own], r.normal[own], (albedo * e)[own]))
+            area += sum(float(areas_of(m.vertices[m.faces]).sum()) for m in r.meshes if m.owner == owner)
+        if not area:
+            return None
+        return fitting_of(lamp, *(np.concatenate(column) for column in zip(*rows, strict=True)), area)
+
+    def _lamplight(self, s: Surface, pose: RigidPose) -> np.ndarray | float:
+        """(n, 3) light of luxels from lamps that are carried."""
+        if not self._burning:
+            return 0.0
+        position, normal = pose.points(s.position), s.normal @ pose.rotation.T.astype(np.float32)
+        back = self._sent_back.get(self._room_around(pose.points(s.box_corners).mean(0)))
+        light = sum(direct(lamp, position, normal, s.thin, blocked) for lamp, blocked in self._burning)
+        return light if back is None else light + back.e(position, normal)
+
     def _radiance(self, points: np.ndarray, room: str) -> np.ndarray:
         """(n, 9, 3) float32 coefficients of the light that arrives at points of a room."""
-        return radiance(self.bake.probes.at(points, room)).astype(np.float32)
+        return radiance(self._dark.probes.at(points, room)).astype(np.float32)
 
-    def _nearest_room(self, point: np.ndarray) -> str:
-        apart = [np.linalg.norm(np.mean(r.polygon, axis=0) - point[:2]) for r in self.house.rooms]
-        return self.house.rooms[int(np.argmin(apart))].id
+    def _room_around(self, point: np.ndarray) -> str:
+        """Id of the room that a point is in, or nearest to."""
+        apart = lambda r: float(np.linalg.norm(np.mean(r.polygon, axis=0) - point[:2]))
+        return room_at(self.house, point) or min(self.house.rooms, key=apart).id
 
     # ------------------------------------------------------------------ what is drawn
 
@@ -413,11 +523,10 @@ class MovingHouse:
     # ------------------------------------------------------------------ the house's pages
 
     @functools.cached_property
-    def _static(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-        """From starts and directions, (n, 3) each, whether the house without what moved is met, (n,) bool."""
+    def _static(self) -> Rays:
+        """Rays among the house without what moved."""
         solid = [m.vertices[m.faces] for m, _ in self._still if m.page in self._room_of_page and m.alpha >= 0.9]
-        first = rays_among(np.concatenate(solid))
-        return lambda start, ahead: first(start, ahead)[0] >= 0
+        return rays_among(np.concatenate(solid))
 
     def _sun_share(
         self,
@@ -440,7 +549,7 @@ class MovingHouse:
         if len(which):
             side = np.sign(normal[which] @ self._towards)[:, None] * normal[which]
             start = (position[which] + side * 4e-3).astype(np.float32)
-            met = self._static(start, np.broadcast_to(self._towards, start.shape))
+            met = self._static(start, np.broadcast_to(self._towards, start.shape))[0] >= 0
             for placed in (*(p for name, p in self._placed.items() if name not in without), *own):
                 met |= hidden_by(placed, start, self._towards)
             which = which[~met]
@@ -485,13 +594,15 @@ class MovingHouse:
         """(h, w, 3) float32 light in luxels, and (h, w) float32 share of the sun in texels, of a page without what
         moved."""
         if page not in self._base:
-            held = self._receiver(page).held
+            held = self._receiver(page).held if self._dark is self.bake else self._dark.ingredients(page)
             self._base[page] = held.soft.astype(np.float32), held.sun.astype(np.float32) / 255
         return self._base[page]
 
     def _take_out(self, names: Sequence[str]) -> None:
         """Give pages the light back that things hid where they were baked."""
         self._sunlit = {}
+        if self._dark is not self.bake and not self._touched:
+            self._touched = self._of_lamps
         for name in names:
             thing = self._things[name]
             if thing.surface is None or thing.rest is None or name.endswith(INSIDE_NAME):
@@ -515,6 +626,16 @@ class MovingHouse:
             if len(self._portals):
                 self._give_sun_back(name, placed)
 
+    @functools.cached_property
+    def _of_lamps(self) -> set[Tile]:
+        """Tiles that lamps lit which are carried now."""
+        out: set[Tile] = set()
+        for page in self._room_of_page:
+            less = np.abs(self._receiver(page).held.soft.astype(np.float32) - self._light(page)[0]).max(2)
+            rows, columns = np.nonzero(less > DARKER)
+            out |= {(page, int(i), int(k)) for i, k in {*zip(rows // TILE, columns // TILE)}}
+        return out
+
     def _without(
         self, placed: Placed, r: Receiver, e: np.ndarray, at: tuple[slice, slice]
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -532,7 +653,7 @@ class MovingHouse:
         """(n,) light of places near each other in an empty room, and (n, 9) coefficients of what arrives there, both as
         means of the colours."""
         middle = position[len(position) // 2] + 0.05 * normal[len(position) // 2]
-        around = self._radiance(position, room_at(self.house, middle) or self._nearest_room(middle)).mean(2)
+        around = self._radiance(position, self._room_around(middle)).mean(2)
         e = np.einsum("nk,nk->n", unhidden(normal, np.zeros(len(normal), bool)), around)
         return np.maximum(e, 1e-5), around
 
@@ -559,16 +680,20 @@ class MovingHouse:
                 continue
             groups.setdefault(BODIES if self._things[name].rest is None else name, []).append(placed)
         moved = [n for n, g in groups.items() if n not in self._hiding or not self._hiding[n].holds(g, slack)]
-        before = [self._hiding.pop(n) for n in [*self._hiding] if n in moved or n not in groups]
+        before = [self._hiding.pop(n) for n in [*self._hiding] if n in moved or n not in (*groups, LAMPS)]
         self._hiding |= {name: self._hides(groups[name]) for name in moved}
         about = [*before, *(self._hiding[name] for name in moved)]
+        if self._lamp_tiles.get(LAMPS) is not self._hiding.get(LAMPS):
+            about += [self._hiding[LAMPS]] if LAMPS in self._hiding else []
+            self._hiding |= self._lamp_tiles
+            about += [self._hiding[LAMPS]]
         if not self._shown:
             about = [*self._hiding.values()]
-        tiles = {tile for hides in about for tile in (*hides.tiles, *hides.sunlit)}
+        tiles = {tile for hides in about for tile in (*hides.tiles, *hides.direct)}
         tiles |= set() if self._shown else self._touched
         new = {}
         for tile in tiles:
-            things = [h for h in self._hiding.values() if tile in h.tiles or tile in h.sunlit]
+            things = [h for h in self._hiding.values() if tile in h.tiles or tile in h.direct]
             new[tile] = _Shown(things, _together([t.tiles[tile] for t in things if tile in t.tiles]))
         changed = [tile for tile, shown in new.items() if self._differs(tile, shown)]
         same = list(new.keys() - set(changed))
@@ -582,7 +707,7 @@ class MovingHouse:
     def _differs(self, tile: Tile, new: _Shown) -> bool:
         """True where a tile surely looks another way than it is shown."""
         shown = self._shown.get(tile)
-        return shown is None or not new.things or any(tile in t.sunlit for t in (*shown.things, *new.things))
+        return shown is None or not new.things or any(tile in t.direct for t in (*shown.things, *new.things))
 
     def _patches(self, tiles: Sequence[Tile]) -> Iterator[Patch]:
         """Tiles as they are to be shown, near ones in one."""
@@ -741,8 +866,8 @@ class _Hides:
     tiles: Mapping[Tile, np.ndarray]
     """(HALF_TILE, HALF_TILE, 4) float32: the share of its light that every second luxel gets past the thing, and the
     light that the thing sends it."""
-    sunlit: frozenset[Tile]
-    """Tiles from which they may hide the sun."""
+    direct: frozenset[Tile]
+    """Tiles from which they may hide the sun, or which a carried lamp lights."""
 
     def holds(self, things: Sequence[Placed], slack: float) -> bool:
         """True for the same things in about the same places."""

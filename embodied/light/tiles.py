@@ -12,6 +12,7 @@ import numpy as np
 from embodied.light.pages.cover import sources
 from embodied.light.pages.files import Bake, Ingredients
 from embodied.light.tracing.rays import rays_among
+from embodied.scene.lit_pages import LitMesh
 
 TILE = 16
 """Luxels along the sides of the tiles in which pages change."""
@@ -34,7 +35,9 @@ class Receiver:
     takes: np.ndarray
     """(h, w) bool: its light may change."""
     mesh: np.ndarray
-    """(h, w) int32: which of the page's meshes a luxel is of; -1 where it is of none."""
+    """(h, w) int32: which of `meshes` a luxel is of; -1 where it is of none."""
+    meshes: tuple[LitMesh, ...]
+    """Of the page."""
     low: np.ndarray
     high: np.ndarray
     """(rows, columns, 3) boxes of its tiles; empty ones are far away."""
@@ -96,6 +99,7 @@ def read_receiver(bake: Bake, page: int) -> Receiver:
         shape(normal[shown_by]),
         takes.reshape(h, w),
         mesh.reshape(h, w),
+        tuple(m for m, _ in whole),
         low,
         high,
         _sampled(shape(where)),
