@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from embodied.assets.json_file import load_json
 from embodied.cli.common import Furnished, Printed, catalogue_of, check_machine, fetch, note, show
-from embodied.options import CubeFace, Option, OutputPng, drawn_as, house_folder, whole
+from embodied.house.moment import Moment
+from embodied.options import CubeFace, InputPath, Option, OutputPng, drawn_as, house_folder, whole
 from embodied.render.panorama import VFOV36
 from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import PICTURES, parse_pictures
@@ -37,6 +39,8 @@ class RenderOptions(Furnished, Printed):
     """Write a view from --node here."""
     yaw: float = 0.0
     """Direction of --view, degrees counter-clockwise."""
+    moment: InputPath | None = None
+    """Draw --node with things moved, doors opened and lamps switched, as JSON (docs/moving.md)."""
     camera: Annotated[str, Option(words=CAMERAS)] = "ideal"
     """Camera that takes the picture of --node; panorama files are always taken by the ideal one."""
     device: int = 0
@@ -53,11 +57,15 @@ def run(args: RenderOptions) -> None:
             "--camera takes pictures of one viewpoint: --node 3 --view node3.png --camera phone; panorama files stay "
             "ideal, and environments and training photograph what they show of them"
         )
+    if args.moment is not None and args.node is None:
+        raise ValueError("--moment shows one viewpoint: --node 3 --view node3.png --moment moment.json")
     check_machine("unlit")  # the house may be lit already
     catalogue = catalogue_of(args)
     drawn = parse_pictures(args.pictures, args.size)
     with open_folder(args.folder, catalogue, args.cache, drawn) as world:
         fetch(catalogue, world.house)
+        if args.moment is not None:
+            world.show(load_json(args.moment, Moment))
         if args.node is not None:
             one(args, args.node, world)
             return

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from embodied.assets.json_file import load_json
 from embodied.cli.common import Furnished, Printed, catalogue_of, show
 from embodied.cli.exports import Export, register_export
-from embodied.options import HouseFolder, Option, OutputFolder, file_ending_in
+from embodied.house.moment import Moment
+from embodied.options import HouseFolder, InputPath, Option, OutputFolder, file_ending_in
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
@@ -26,6 +28,8 @@ class HouseOptions(Furnished, Printed):
     """Folder that `embodied house` wrote."""
     light: Annotated[str, Option(words=("none", *LIT_QUALITIES))] = "normal"
     """Quality of the baked light; none: export the unlit house."""
+    moment: InputPath | None = None
+    """Things moved, doors opened and lamps switched, as JSON (docs/moving.md)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,8 +101,15 @@ def lit_house(args: HouseOptions) -> tuple[House, Catalogue, LitPages | None]:
 
     catalogue = catalogue_of(args)
     house = load_lit_house(args.house, catalogue)
+    moment = Moment() if args.moment is None else load_json(args.moment, Moment)
     if args.light == "none":
-        return house, catalogue, None
+        return moment.applied(house), catalogue, None
+    if not moment.is_rest:
+        from embodied.world import open_world
+
+        with open_world(house, catalogue, args.cache, args.light) as world:
+            world.show(moment)
+            return moment.applied(house), catalogue, world.lit
     from embodied.light import bake, progress_bar
 
     with progress_bar() as progress:
