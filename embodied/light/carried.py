@@ -15,13 +15,13 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.house.moment import Moment, RigidPose
-from embodied.light.movers import Cloud, discs_of, hiding
+from embodied.light.movers import RAY_LIFT, Cloud, discs_of, hiding
 from embodied.light.tracing.emitters import Lamp
 
 LAMP_RAYS = 24
 """Rays of a place to a lamp."""
-LIFT, BULB = 4e-3, 0.06
-"""Metres above a surface at which rays begin, and before a bare bulb at which they end."""
+BULB = 0.06
+"""Metres before a bare bulb at which rays end."""
 
 Blocked: TypeAlias = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """From starts (n, 3), unit directions (n, 3) and metres (n,): (n,) bool, something is met nearer than that."""
@@ -77,8 +77,8 @@ def direct(lamp: Lamp, position: np.ndarray, normal: np.ndarray, thin: np.ndarra
         leaving = 1.0 if bare else -ahead @ lamp.normals[i]
         g = np.maximum(cos, 0) * np.maximum(leaving, 0) / np.maximum(far**2, BULB if bare else 1e-4) * lamp.weights[i]
         which = np.flatnonzero(g > 0)
-        start = position[which] + (normal[which] * side[which, None]) * LIFT
-        reach = far[which] - (BULB if bare else 2 * LIFT)
+        start = position[which] + (normal[which] * side[which, None]) * RAY_LIFT
+        reach = far[which] - (BULB if bare else 2 * RAY_LIFT)
         free = ~blocked(start.astype(np.float32), ahead[which].astype(np.float32), reach)
         total[which] += np.minimum(g[which] * free * (lamp.area / np.pi), 400.0 if bare else 4.0)
     total /= LAMP_RAYS
