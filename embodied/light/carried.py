@@ -87,7 +87,7 @@ def direct(lamp: Lamp, position: np.ndarray, normal: np.ndarray, thin: np.ndarra
 
 @dataclass(frozen=True, eq=False)
 class SentBack:
-    """What a room sends back of the light of a lamp."""
+    """The room as it sends a lamp's light back."""
 
     cloud: Cloud
     """Its surfaces, by the light that they reflect first."""

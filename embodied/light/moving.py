@@ -386,7 +386,7 @@ class MovingHouse:
         return {names[k]: np.dstack([passed, cv2.resize(e[k], fine)]) for k in lit}
 
     def _fitting(self, lamp: Lamp) -> Lamp | None:
-        """What the lamp itself sends back of its light, where it was baked; None where it has no surface."""
+        """The lamp as it sends its own light back, where it was baked; None where it has no surface."""
         owner = next(x.placement for x in self.house.lights if x.id == lamp.id)
         rows, area = [], 0.0
         for page in sorted({m.page for m in self.bake.lit.meshes if m.owner == owner and m.page in self._room_of_page}):
