@@ -44,7 +44,7 @@ def lamp_at(lamp: Lamp, rest: RigidPose, pose: RigidPose) -> Lamp:
 
 
 def fitting_of(lamp: Lamp, position: np.ndarray, normal: np.ndarray, sent: np.ndarray, area: float) -> Lamp:
-    """What a lamp's own shade and foot reflect of its light, as a lamp.
+    """The lamp that a lamp's own shade and foot are, by the light of it that they reflect.
 
     Args:
       position, normal: (n, 3) of luxels of the lamp, world, of one size.
@@ -103,7 +103,7 @@ class SentBack:
 def sent_back(
     e: np.ndarray, albedo: np.ndarray, position: np.ndarray, normal: np.ndarray, area: np.ndarray
 ) -> SentBack:
-    """What a room sends back of a lamp's light `e` on pieces of its surface, (n, 3) each, of areas (n,)."""
+    """The light that a room sends back, from a lamp's light `e` on pieces of it, (n, 3) each, of areas (n,)."""
     power = albedo * e * area[:, None]
     d = discs_of(position, normal, np.zeros(len(area), bool), power.sum(1) + 1e-9)
     areas = np.add.reduceat(area[d.luxels], d.first)
