@@ -36,6 +36,8 @@ PHYSICS = {
 """Of joints by kind: RoboCasa's damping of cabinets and drawers, MolmoSpaces' friction, and its numbers of ovens."""
 GAP = 0.002
 """Metres between a front and what is around it."""
+THICK = 0.04
+"""Metres of a front that touch: the inner edge of a thicker one meets its neighbour as it turns."""
 THIN = 0.004
 """Side of a box, metres, below which it is left out."""
 
@@ -164,7 +166,10 @@ def boxes_of(case: Case, density: float, solid: Sequence[CollisionBox]) -> Itera
         free = [[-GAP, -GAP, -GAP], [GAP, GAP, 1.0]] if m.kind == "lid" else [[-GAP, -1.0, -GAP], [GAP, GAP, GAP]]
         for hole in (m.box + free, m.inside):
             left = [piece for b in left for piece in collision.without(b, (hole[0], hole[1]))]
-        yield body, _box(m.box + np.array([[GAP], [-GAP]]) * [1, 0, 1]), LEAF_DENSITY
+        leaf = m.box + np.array([[GAP], [-GAP]]) * [1, 0, 1]
+        if m.kind != "lid":
+            leaf[1, 1] = min(leaf[1, 1], leaf[0, 1] + THICK)
+        yield body, _box(leaf), LEAF_DENSITY
         yield case.bodies[f"{m.name}_handle"], _box(m.handle), LEAF_DENSITY
         boards = boards_of(m, case.placement.object_class) if m.cut else []
         if m.kind == "drawer":

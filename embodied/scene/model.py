@@ -148,8 +148,8 @@ def loose(house: House, catalogue: Catalogue) -> frozenset[str]:
 
 
 def takeable(house: House, catalogue: Catalogue) -> frozenset[str]:
-    """Those of them that a hand can take: no larger than SMALL, and nothing rests on them."""
-    carry = {p.parent for p in house.placements}
+    """Those of them that a hand can take: no larger than SMALL, not plugged in, and nothing rests on them."""
+    carry = {p.parent for p in house.placements} | {light.placement for light in house.lights}
     sizes = {p.id: max(p.size) for p in house.placements}
     return frozenset(i for i in loose(house, catalogue) if sizes[i] <= SMALL and i not in carry)
 
