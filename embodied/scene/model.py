@@ -10,7 +10,7 @@ import dataclasses
 import functools
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,6 +64,8 @@ LEAVES = ("/leaf", "/leaf_2", "/glass")
 HOLLOW = ("person",)
 """Classes whose models are shells with gaps, through which one would see what stands behind them. Drawn from both sides
 here instead of by `two_sided` of their import, which would double what is baked of them."""
+YIELDING = ("curtain",)
+"""Classes that give way to doors on hinges."""
 UNDERFOOT = 0.03
 """Things on the floor that are lower than this (rugs, mats) are cloth to walk on and stop nothing, metres."""
 
@@ -206,7 +208,7 @@ def build_spec(
         _add_pages(spec, lit, house, lambda m: _lit_pieces(m, frames, cases))
         _add_insides(spec, cases)
     if collisions:
-        _add_collisions(spec, house, catalogue, bodies, cases)
+        _add_collisions(spec, house, catalogue, bodies, cases, YIELDING if hung else ())
         _add_leaves(spec, shell, hung)
     return spec
 
@@ -495,7 +497,12 @@ def _pieces(mesh: LitMesh, centre: np.ndarray) -> Iterator[tuple[np.ndarray, np.
 
 
 def _add_collisions(
-    spec: mujoco.MjSpec, house: House, catalogue: Catalogue, bodies: Mapping[str, Hung], cases: Mapping[str, Case]
+    spec: mujoco.MjSpec,
+    house: House,
+    catalogue: Catalogue,
+    bodies: Mapping[str, Hung],
+    cases: Mapping[str, Case],
+    without: Collection[str],
 ) -> None:
     for room in house.rooms:
         _add_boxes(spec.worldbody, f"{room.id}/floor", collision.floor_boxes(house, room))
@@ -503,7 +510,7 @@ def _add_collisions(
             _add_boxes(spec.worldbody, f"{room.id}/wall_{i}", collision.wall_boxes(house, room, i))
     known: dict[tuple, tuple[collision.CollisionBox, ...]] = {}
     for p in house.placements:
-        if is_underfoot(p):
+        if is_underfoot(p) or p.object_class in without:
             continue
         density = collision.density_of(catalogue.assets[p.asset])
         if p.id in cases:
