@@ -339,12 +339,12 @@ def _leaf(width: float, height: float, thick: float, style: str) -> tuple[Shape,
 def _panel(x0: float, x1: float, z0: float, z1: float, thick: float) -> Shape:
     """A panel between stiles, sunk by a third of the leaf, with a sloping moulding on both sides."""
     sunk, slope, lip = thick * 0.28, 0.022, 0.0025
-    # The moulding starts a little inside the rounded edges of the stiles, so that no gap shows.
+    # The moulding starts within the rounded edges of the stiles: it shows no gap, and nothing of their dark sides.
     outer = [(x0 - lip, z0 - lip), (x1 + lip, z0 - lip), (x1 + lip, z1 + lip), (x0 - lip, z1 + lip)]
     inner = [(x0 + slope, z0 + slope), (x1 - slope, z0 + slope), (x1 - slope, z1 - slope), (x0 + slope, z1 - slope)]
     shapes = []
     for face, side in ((0.0, -1.0), (-thick, 1.0)):
-        rim = [(x, face + side * lip, z) for x, z in outer]
+        rim = [(x, face + side * 0.2 * lip, z) for x, z in outer]
         bed = [(x, face + side * sunk, z) for x, z in inner]
         shapes += [quads([bed]), between(rim, bed)] if side > 0 else [quads([bed[::-1]]), between(bed, rim)]
     return _grain_up(joined(*shapes))
