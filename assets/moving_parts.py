@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from embodied.assets.built.parametric import plain
-from embodied.assets.built.primitives import box, lathe, part, tube
+from embodied.assets.built.primitives import Shape, box, cylinder, lathe, part, tube
 from embodied.assets.records import Finish, MeshPart
 
 OPEN = "open/"
@@ -55,6 +56,13 @@ GRIP, OFF_CENTRE = 0.007, 0.25
 RIM, BACK, STEP = 0.014, 0.02, 0.34
 """Metres between an inside and the edge of its front, and the back of the thing, and about between shelves."""
 WHITE, STEEL, DARK = plain((0.86, 0.86, 0.84), 0.5), plain((0.6, 0.6, 0.6), 0.3, 1.0), plain((0.12, 0.12, 0.12), 0.5)
+TINTS = [
+    plain(c, 0.7, specular=0.2)
+    for c in ((0.85, 0.84, 0.8), (0.33, 0.42, 0.52), (0.72, 0.6, 0.45), (0.45, 0.5, 0.42), (0.62, 0.4, 0.38))
+]
+KITCHEN = {"base cabinet", "drawer cabinet", "wall cabinet", "tall cabinet", "kitchen island", "glass-door cabinet"}
+CLOSETS = {"wardrobe", "dresser", "bedside table", "sideboard", "changing table", "bathroom vanity", "tv stand"}
+"""Classes that hold crockery, and cloth."""
 FIXED, WITHIN = -1, -2
 XZ = [0, 2]
 Corners = tuple[np.ndarray, np.ndarray]
@@ -428,8 +436,10 @@ def _furnished(
     boxes = [box([p[0], y0, p[1]], [q[0], y1, q[1]]) for p, q in walls]
     inside = [part(skin, *boxes, box([a, y1, c], [b, y1 + 0.01, d]))]
     boards = [box(p, q, 0.001) for p, q in boards_of(m, object_class)]
+    stored = _stored(m, object_class, boards) if empty else []
     if m.kind == "drawer":
-        return inside, (part(skin, *boards),)
+        return inside, (part(skin, *boards), *stored)
+    inside += stored
     if object_class in FLAPS:
         rows = [(y, z) for y in np.linspace(y0 + 0.03, y1 - 0.02, 9) for z in z0 + (z1 - z0) * np.array([0.3, 0.65])]
         inside.append(part(STEEL, *(tube([(x0, y, z), (x1, y, z)], 0.003, 5) for y, z in rows)))
@@ -439,6 +449,33 @@ def _furnished(
             y, z = (y0 + y1) / 2, z1 - 0.36
             inside.append(part(STEEL, tube([(x0, y, z), (x1, y, z)], 0.012, 10)))
     return inside, ()
+
+
+def _stored(m: MovingPart, object_class: str, boards: Sequence[Shape]) -> list[MeshPart]:
+    """Folded clothes, crockery or food, on the ground and on the boards; the same in the same thing."""
+    kinds = {"fridge": 2} | dict.fromkeys(KITCHEN, 1) | dict.fromkeys(CLOSETS, 0)
+    if (kind := kinds.get(object_class)) is None:
+        return []
+    (x0, y0, z0), (x1, y1, z1) = m.inside
+    drawer = m.kind == "drawer"
+    floors = [z0 + 0.011] if drawer else sorted([z0, *(float(b.vertices[:, 2].max()) for b in boards)])
+    bowl = [(0, 0), (0.06, 0), (0.105, 0.03), (0.1, 0.03), (0.055, 0.008), (0, 0.008)]
+    shapes = [
+        [box([-0.085, -0.11, 0.032 * k], [0.085, 0.11, 0.032 * k + 0.03], 0.012) for k in range(4)],
+        [lathe(bowl, 16).moved(z=0.012 * k) for k in range(5)],
+        [cylinder(0.034, 0, 0.2, 0.012), box([-0.035, -0.035, 0], [0.035, 0.035, 0.18], 0.003)],
+    ][kind]
+    things: dict[int, list[Shape]] = {}
+    for row, (low, high) in enumerate(itertools.pairwise([*floors, z1])):
+        spots = np.linspace(x0, x1, max(1, int((x1 - x0) / (0.1 if kind == 2 else 0.24))) + 1)
+        for k, x in enumerate((spots[1:] + spots[:-1]) / 2):
+            chosen = (7 * k + 5 * row + int(1e3 * x1)) % 5
+            fits = [s for s in shapes if s.vertices[:, 2].max() < high - low - 0.03]
+            some = fits[chosen % 2 : chosen % 2 + 1] if kind == 2 else fits[: chosen + (row == 0 and drawer)]
+            for layer, shape in enumerate(some):
+                tint = (chosen + (layer if kind == 0 else 0)) % len(TINTS)
+                things.setdefault(tint, []).append(shape.moved(float(x), (y0 + y1) / 2 - 0.04, low))
+    return [part(TINTS[tint], *made) for tint, made in things.items()]
 
 
 def boards_of(m: MovingPart, object_class: str) -> list[Corners]:
