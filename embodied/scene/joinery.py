@@ -316,15 +316,15 @@ def _leaf(width: float, height: float, thick: float, style: str) -> tuple[Shape,
     if style == "four_panels" and width > 0.5:
         columns = [(stile, width / 2 - 0.045), (width / 2 + 0.045, width - stile)]
     shapes = [
-        box([0, -thick, 0], [stile, 0, height], 0.002),
-        box([width - stile, -thick, 0], [width, 0, height], 0.002),
+        box([0, -thick, 0], [stile, 0, height]),  # flush: grooves so narrow are dark dashes from a distance
+        box([width - stile, -thick, 0], [width, 0, height]),
     ]
     heights = [0.0, *(z for row in rows for z in row), height]
     for z0, z1 in zip(heights[::2], heights[1::2]):
-        shapes.append(box([stile, -thick, z0], [width - stile, 0, z1], 0.0015))
+        shapes.append(box([stile, -thick, z0], [width - stile, 0, z1]))
     if len(columns) == 2:
         for z0, z1 in rows:
-            shapes.append(box([columns[0][1], -thick, z0], [columns[1][0], 0, z1], 0.0015))
+            shapes.append(box([columns[0][1], -thick, z0], [columns[1][0], 0, z1]))
     panes = []
     for r, (z0, z1) in enumerate(rows):
         for x0, x1 in columns:
@@ -338,13 +338,13 @@ def _leaf(width: float, height: float, thick: float, style: str) -> tuple[Shape,
 
 def _panel(x0: float, x1: float, z0: float, z1: float, thick: float) -> Shape:
     """A panel between stiles, sunk by a third of the leaf, with a sloping moulding on both sides."""
-    sunk, slope, lip = thick * 0.28, 0.022, 0.0025
-    # The moulding starts within the rounded edges of the stiles: it shows no gap, and nothing of their dark sides.
+    sunk, slope, lip = thick * 0.28, 0.022, 0.001
+    proud = lip * sunk / slope  # the moulding leaves the face just where a stile ends: nothing of its dark side shows
     outer = [(x0 - lip, z0 - lip), (x1 + lip, z0 - lip), (x1 + lip, z1 + lip), (x0 - lip, z1 + lip)]
     inner = [(x0 + slope, z0 + slope), (x1 - slope, z0 + slope), (x1 - slope, z1 - slope), (x0 + slope, z1 - slope)]
     shapes = []
     for face, side in ((0.0, -1.0), (-thick, 1.0)):
-        rim = [(x, face + side * 0.2 * lip, z) for x, z in outer]
+        rim = [(x, face - side * proud, z) for x, z in outer]
         bed = [(x, face + side * sunk, z) for x, z in inner]
         shapes += [quads([bed]), between(rim, bed)] if side > 0 else [quads([bed[::-1]]), between(bed, rim)]
     return _grain_up(joined(*shapes))
