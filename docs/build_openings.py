@@ -1,6 +1,6 @@
 """Writes into docs/moving.md which classes of furniture open, from the models that are installed.
 
-    python docs/build_openings.py
+python docs/build_openings.py
 """
 
 from __future__ import annotations
