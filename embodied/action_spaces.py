@@ -18,10 +18,12 @@ from embodied.interface import (
     TURNS,
     VIEW_PITCHES,
     VIEW_YAWS,
+    Action,
     Candidates,
     Close,
     Episode,
     Move,
+    Observation,
     Open,
     Place,
     Pose,
@@ -142,6 +144,11 @@ def node_ahead(graph: NavGraph, pose: Pose) -> int | None:
         return None
     offset = np.where(inside, np.round(np.hypot(bearing, pitch - pose.pitch), 9), np.inf)
     return int(nodes[int(np.argmin(offset))])
+
+
+def door_actions(o: Observation) -> dict[str, Action]:
+    """Doors that can be opened and closed now, by the name that language models and agents over HTTP call it."""
+    return {f"open {k}": Open(k) for k in o.can_open} | {f"close {k}": Close(k) for k in o.can_close}
 
 
 def doors_moved(step: Step, graph: NavGraph, closed: frozenset[str]) -> frozenset[str]:

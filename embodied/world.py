@@ -20,7 +20,7 @@ from embodied.house.house import House
 from embodied.house.lighting import load_lit_house
 from embodied.house.moment import Moment, RigidPose, apart
 from embodied.interface import Sighting
-from embodied.navigation.doors import OPEN_FROM
+from embodied.navigation.free_space import closed_doors
 from embodied.navigation.graph import NavGraph, build_graph
 from embodied.navigation.poses import FreePoses
 from embodied.render.camera import View
@@ -230,14 +230,12 @@ class World:
         if not state:
             return self
         if state not in self._states:
-            closed = self.graph.closed.union(d for d, x in state if x < OPEN_FROM).difference(
-                d for d, x in state if x >= OPEN_FROM
-            )
-            graph = dataclasses.replace(self.graph, closed=closed)
-            made_of = self.catalogue, graph, self.cache, self.pictures
             moment = Moment(openness=dict(state))
+            now = moment.applied(self.house)
+            graph = dataclasses.replace(self.graph, closed=closed_doors(now))
+            made_of = self.catalogue, graph, self.cache, self.pictures
             if self.pictures.quality is None:
-                world = type(self)(moment.applied(self.house), *made_of)
+                world = type(self)(now, *made_of)
                 world._lender = self
             else:
                 world = type(self)(self.house, *made_of)
@@ -460,7 +458,7 @@ class World:
 
     def sightings(self, node: int) -> tuple[Sighting, ...]:
         """The objects that can be seen from a node, the largest in view first. Needs no panoramas."""
-        if not self.moment.is_rest:
+        if self._lender is not None or not self.moment.is_rest:
             seen = self.renderer.seen(self.graph.positions[node], FACE)
             return sightings_table([seen], len(self.house.placements)).at(0, self.house)
         return self._sightings.at(node, self.house)

@@ -11,11 +11,12 @@ from handmade import HandCatalogue, furnished
 
 from embodied.envs.base import ActionError, DoorRule, HelpEnv
 from embodied.evaluation.rollout import play
+from embodied.house.moment import Moment
 from embodied.interface import Close, Episode, FindObject, FollowRoute, Move, Open, Pose, Stop, Task, viewpoint
 from embodied.kinds import metrics
 from embodied.kinds.task_kind import EnvInputs, kind_named
 from embodied.language.people_language import People
-from embodied.navigation.doors import place_named, with_doors
+from embodied.navigation.doors import place_named
 from embodied.navigation.graph import OPENING, behind_doors, build_graph
 from embodied.policies.listeners import ScriptedListener
 from embodied.records import from_json, to_json
@@ -45,16 +46,16 @@ def task(world):
     return Task("t", "doors", HOUSE.name, Pose(start), goal, goals, "find it", 0.0, 60, closed=(door,))
 
 
-def played(world, task, name, rules=None) -> Episode:
-    return play(KIND.environments(EnvInputs({HOUSE.name: world}, rules=rules)), KIND.agent(name), [task], seed=0)[0]
+def played(world, task, name) -> Episode:
+    return play(KIND.environments(EnvInputs({HOUSE.name: world})), KIND.agent(name), [task], seed=0)[0]
 
 
 def test_a_house_with_closed_doors_has_the_graph_that_it_has_with_open_ones():
-    graph = build_graph(with_doors(HOUSE, {"door_1": 1.0}))
-    shut = build_graph(with_doors(HOUSE, {"door_1": 0.2}))
+    at = lambda openness: Moment(openness={"door_1": openness}).applied(HOUSE)
+    graph, shut = build_graph(at(1.0)), build_graph(at(0.2))
     assert np.array_equal(graph.positions, shut.positions) and graph.doors == shut.doors
     assert (graph.closed, shut.closed) == (frozenset(), {"door_1"})
-    assert build_graph(with_doors(HOUSE, {"door_1": 0.5}), open_from=0.67).closed == {"door_1"}
+    assert build_graph(at(0.5), open_from=0.67).closed == {"door_1"}
 
 
 def test_only_the_agent_that_opens_doors_arrives_and_spl_counts_the_opening(world, task):
@@ -104,8 +105,9 @@ def test_agents_that_know_no_doors_arrive_under_other_rules(world, task, rule):
                 for n, s in zip(ways, situations, strict=True)
             ], None
 
-    make = KIND.environments(EnvInputs({HOUSE.name: world}, rules=rule))
-    (episode,) = play(make, Knowing(), [task], seed=0)
+    env = HelpEnv({HOUSE.name: world})
+    env.doors = DoorRule(rule)
+    (episode,) = play(lambda: env, Knowing(), [task], seed=0)
     assert metrics.success(episode, world.graph) == 1
     assert metrics.path_length(episode, world.graph) > world.graph.distance[episode.nodes[0], episode.nodes[-1]] + 0.5
     assert any(isinstance(s.action, Open) for s in episode.steps) == (DoorRule(rule) is DoorRule.PUSH)

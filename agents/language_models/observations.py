@@ -14,24 +14,12 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from PIL import Image, ImageDraw
 
+from embodied.action_spaces import door_actions
 from embodied.assistants.words import side
 from embodied.geometry import wrap
 from embodied.gym.sensors import PanoramaStore
 from embodied.house.floor_plan import font
-from embodied.interface import (
-    STEP,
-    VIEW_PITCHES,
-    Action,
-    Ask,
-    Close,
-    Move,
-    Observation,
-    Open,
-    SeenPlace,
-    Sight,
-    Stop,
-    viewpoint,
-)
+from embodied.interface import STEP, VIEW_PITCHES, Action, Ask, Move, Observation, SeenPlace, Sight, Stop, viewpoint
 from embodied.navigation.doors import place_named
 from embodied.render.panorama import Panorama
 
@@ -70,8 +58,7 @@ def actions_by_name(o: Observation) -> dict[str, Action]:
     moves: dict[str, Action] = {
         (c.words[i] if c.words else f"go {i}"): Move(i) for i in range(len(c)) if bool(c.allowed[i])
     }
-    moves |= {f"open {i}": Open(i) for i in o.can_open} | {f"close {i}": Close(i) for i in o.can_close}
-    return {**moves, **{f"ask {i.value}": Ask(i) for i in o.can_ask}, "stop": Stop()}
+    return {**moves, **door_actions(o), **{f"ask {i.value}": Ask(i) for i in o.can_ask}, "stop": Stop()}
 
 
 def candidates_in_words(o: Observation, names: Sequence[tuple[str, float, float]] = ()) -> str:

@@ -10,21 +10,11 @@ import urllib.parse
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from embodied.action_spaces import door_actions
 from embodied.errors import UnableError
-from embodied.interface import (
-    Action,
-    Actions,
-    Agent,
-    Ask,
-    Close,
-    Intention,
-    Move,
-    Observation,
-    Observations,
-    Open,
-    Rngs,
-    Stop,
-)
+from embodied.interface import Action, Actions, Agent, Ask, Intention, Move, Observation, Observations, Rngs, Stop
 from embodied.kinds.plugins import made_by_name
 from embodied.records import RecordError, parse
 
@@ -141,12 +131,10 @@ def acted(o: Observation, answer: bytes) -> Action:
         return Stop()
     word = body.get("action") if isinstance(body, dict) else None
     verb, _, what = word.partition(" ") if isinstance(word, str) else ("", "", "")
-    if what.isdigit() and len(what) < 4:
-        k = int(what)
-        if verb == "go" and k < len(o.candidates) and o.candidates.allowed[k]:
-            return Move(k)
-        if (verb == "open" and k in o.can_open) or (verb == "close" and k in o.can_close):
-            return Open(k) if verb == "open" else Close(k)
+    if verb == "go" and what.isdigit() and len(what) < 4 and int(what) in np.flatnonzero(o.candidates.allowed):
+        return Move(int(what))
+    if word in (doors := door_actions(o)):
+        return doors[word]
     if verb == "ask" and what in {i.value for i in o.can_ask}:
         question = body.get("question") if isinstance(body, dict) else None
         return Ask(Intention(what), question=question[:300] if isinstance(question, str) else None)

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 from embodied.house.house import DOORS, House, Opening, Room
+from embodied.house.moment import WIDEST, Moment
 from embodied.house.shapes import footprint, inward
 
 EYE = 1.5
@@ -20,6 +21,9 @@ JAMB = 0.03
 """Width that a door's lining and the play of its leaf take from its hole on each side, metres."""
 LEAF = 0.05
 """Thickness of an open leaf with its handle, metres."""
+OPEN_FROM = 0.4
+"""Openness from which a door counts as open: Habitat's. A leaf of 0.75 m then leaves 0.46 m, and the agent needs 0.4.
+MolmoSpaces says 0.67, RoboCasa 0.9."""
 
 
 def free_floor(house: House, storey: int) -> shapely.Geometry:
@@ -67,6 +71,45 @@ def leaves(house: House, opening: Opening) -> list[shapely.Polygon]:
         tip = start + long * (math.cos(opening.angle) * across + math.sin(opening.angle) * normal)
         polygons.append(shapely.LineString([start, tip]).buffer(LEAF / 2, cap_style="flat"))
     return polygons
+
+
+def room_doors(house: House) -> list[Opening]:
+    """Doors with a leaf between two rooms."""
+    return [o for o in house.openings if o.kind == "door" and o.rooms[1] is not None and o.leaf_finish is not None]
+
+
+def closed_doors(house: House, threshold: float = OPEN_FROM) -> frozenset[str]:
+    """Doors between rooms that are open by less than `threshold`, as the house rests.
+
+    Args:
+      threshold: openness, 0 to 1, from which a door counts as open.
+    """
+    return frozenset(o.id for o in room_doors(house) if o.angle < threshold * WIDEST)
+
+
+def opened(house: House, threshold: float = OPEN_FROM) -> House:
+    """The house with its closed doors wide open."""
+    closed = closed_doors(house, threshold)
+    return Moment(openness=dict.fromkeys(sorted(closed), 1.0)).applied(house) if closed else house
+
+
+def doors_of_edges(positions: np.ndarray, edges: np.ndarray, house: House) -> dict[tuple[int, int], tuple[str, ...]]:
+    """Doors that each edge passes, by edge (i, j), i < j; edges that pass none are left out.
+
+    Args:
+      positions: (n, 3) metres, world.
+      edges: (m, 2) int node pairs.
+    """
+    passed: dict[tuple[int, int], tuple[str, ...]] = {}
+    lines = shapely.linestrings(positions[edges][:, :, :2])
+    floors = np.array([s.elevation for s in house.storeys])
+    storeys = np.abs(positions[edges[:, 0], 2, None] - 1.5 - floors).argmin(1)
+    for o in room_doors(house):
+        storey = house.room_by_id[o.rooms[0]].storey
+        for k in np.flatnonzero(shapely.intersects(lines, shapely.LineString([o.a, o.b])) & (storeys == storey)):
+            edge = (int(edges[k, 0]), int(edges[k, 1]))
+            passed[edge] = (*passed.get(edge, ()), o.id)
+    return passed
 
 
 def doorway(house: House, opening: Opening) -> shapely.Polygon:

@@ -15,8 +15,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from embodied.house.house import DOORS, House, HouseError, Room
-from embodied.navigation.doors import OPEN_FROM, closed_doors, doors_of_edges, opened
-from embodied.navigation.free_space import EYE, free_floor, sight_floor
+from embodied.navigation.free_space import EYE, OPEN_FROM, closed_doors, doors_of_edges, free_floor, opened, sight_floor
 
 AGENT_RADIUS = 0.2
 """Radius of the agent's body, metres."""

@@ -24,6 +24,7 @@ from embodied.interface import (
     Move,
     Observation,
     Observations,
+    Open,
     PrivilegedPolicy,
     Rngs,
     Situation,
@@ -39,7 +40,7 @@ from embodied.teachers.vnla import ask_reason
 
 
 class RandomWalk:
-    """Uniform over the candidates and stop at every step (docs/sources.md, S42); never asks."""
+    """Uniform over the candidates, doors to open and stop at every step (docs/sources.md, S42); never asks."""
 
     def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, Any]:
         return [None if o is None else _random_move(o, rng) for o, rng in zip(observations, rngs)], ()
@@ -49,7 +50,9 @@ class Forward10:
     """The candidate nearest the middle of the view for ten steps, then stop (docs/sources.md, S42)."""
 
     def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, Any]:
-        ahead = lambda o: Move(0) if o.time < 10 and len(o.candidates) else Stop()
+        ahead = lambda o: (
+            Move(int(o.candidates.allowed.argmax())) if o.time < 10 and o.candidates.allowed.any() else Stop()
+        )
         return [None if o is None else ahead(o) for o in observations], ()
 
 
@@ -268,7 +271,7 @@ class HalfwaySkyline(PerEpisodePolicy):
         return shortest_of(s)
 
 
-def _random_move(observation: Observation, rng: np.random.Generator) -> Move | Stop:
-    allowed = np.flatnonzero(observation.candidates.allowed)
-    choice = int(rng.integers(len(allowed) + 1))
-    return Stop() if choice == len(allowed) else Move(int(allowed[choice]))
+def _random_move(o: Observation, rng: np.random.Generator) -> Action:
+    moves = [Move(int(k)) for k in np.flatnonzero(o.candidates.allowed)]
+    possible = [*moves, *map(Open, o.can_open), Stop()]
+    return possible[int(rng.integers(len(possible)))]

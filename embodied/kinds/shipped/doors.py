@@ -8,6 +8,7 @@ from embodied.action_spaces import doors_in
 from embodied.interface import Close, Episode, Task
 from embodied.kinds.metrics import success
 from embodied.kinds.task_kind import (
+    PLAIN_AGENTS,
     Metric,
     Parts,
     PartTasks,
@@ -18,8 +19,7 @@ from embodied.kinds.task_kind import (
     register_kind,
 )
 from embodied.navigation.graph import NavGraph, behind_doors
-from embodied.policies.baselines import Shortest
-from embodied.policies.doors import NeverOpens, RandomOpener, Wanderer
+from embodied.policies.doors import NeverOpens, Wanderer
 from embodied.tasks.doors import with_closed_doors
 from embodied.tasks.find import FindConfig, find_pool, find_task
 
@@ -66,12 +66,7 @@ DOORS_KIND = register_kind(
         name="doors",
         title="Doors",
         tasks=tasks,
-        baselines={
-            "random": RandomOpener,
-            "never opens": NeverOpens,
-            "shortest": Shortest,
-            "wanderer, blind": functools.partial(Wanderer, None),
-        },
+        baselines={**PLAIN_AGENTS, "never opens": NeverOpens, "wanderer, blind": functools.partial(Wanderer, None)},
         looking={"wanderer": Wanderer, "wanderer, never opens": functools.partial(Wanderer, opens=False)},
         needs_stop=True,
         metrics={
