@@ -16,10 +16,13 @@ import numpy as np
 from embodied.house.house import House
 from embodied.interface import Place, SuccessRule, Trajectory
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
+from embodied.navigation.free_space import ajar_doors
 from embodied.tasks.goals import NOT_OBJECTS, footprint_distance
 
 COLLIDED = 1e-3
 """A step that falls short by more than this, metres, is a collision."""
+PUSHED = 0.6
+"""Metres from the middle of a door that stands ajar at which a body has pushed it open."""
 STEEPEST = 60
 """Most degrees that the camera is tilted up or down."""
 Point = tuple[float, float, float]
@@ -178,6 +181,9 @@ class ContinuousEnv:
         self.episode, self.place = episode, place
         self.ground = self._grounds.of(place.house)
         check_on_floor(episode, place.house, self.ground, self.body.forward)
+        self._ajar = {o.id: np.add(o.a, o.b) / 2 for o in place.house.openings if o.id in ajar_doors(place.house)}
+        self.pushed = frozenset[str]()
+        """Doors that stood ajar and were pushed open."""
         self.ways = self.ground.ways(goal_cells(episode, self.ground))
         self.position = self.ground.nearest_free(np.array(episode.start[:2]))
         self.yaw, self.tilt, self.collided, self.collisions, self.ended = episode.yaw, 0, False, 0, False
@@ -205,6 +211,7 @@ class ContinuousEnv:
             self.collided = short > COLLIDED
             self.collisions += self.collided
             self.position = there
+            self.pushed |= {d for d, at in self._ajar.items() if np.linalg.norm(at - there) < PUSHED}
         elif action in (HabitatAction.LEFT, HabitatAction.RIGHT):
             self.yaw += math.radians(self.body.turn) * (1 if action == HabitatAction.LEFT else -1)
         elif action in (HabitatAction.UP, HabitatAction.DOWN):

@@ -6,10 +6,11 @@ The house is its arena: the collision boxes of embodied.scene.model.
 from __future__ import annotations
 
 import copy
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import mujoco
 import numpy as np
@@ -19,8 +20,12 @@ try:
 except ImportError as e:
     raise ImportError(f"a driven body needs dm-control ({e}); pip install --no-deps dm-control") from e
 
-from embodied.navigation.free_space import EYE
-from embodied.scene.model import build_spec, owner_of_name
+from embodied.geometry import rotation
+from embodied.house.moment import WIDEST
+from embodied.navigation.free_space import EYE, ajar_doors
+from embodied.scene.doors import HINGE
+from embodied.scene.joinery import leaf_poses
+from embodied.scene.model import build_spec, owner_of_name, yaw_quat
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
@@ -34,6 +39,8 @@ FASTEST, TURNING = 1.0, 2.5
 """Metres per second and radians per second."""
 CONTROL = 0.02
 """Seconds between two commands."""
+LEAF_MASS = 14.0
+"""Of a leaf on hinges, kg: of wood around a light core."""
 APART = 0.5
 """Seconds without touch after which touching the same thing is another collision (Driver.roll): bodies rebound."""
 
@@ -51,6 +58,7 @@ class RollingBody(composer.Entity):
     def _build(self) -> None:
         root = mjcf.RootElement(model="robot")
         root.default.geom.friction = [1.0, 0.005, 0.0001]
+        root.default.geom.contype = root.default.geom.conaffinity = 3  # the house, and leaves on hinges
         body = root.worldbody.add("body", name="chassis", pos=[0, 0, WHEEL])
         body.add("geom", name="base", type="cylinder", size=[RADIUS, 0.04], pos=[0, 0, 0.04], mass=18, **SLIPPERY)
         size = [RADIUS * 0.8, (HEIGHT - 0.3) / 2]
@@ -205,6 +213,7 @@ def house_arena(house: House, catalogue: Catalogue) -> tuple[composer.Arena, dic
     root.option.timestep, root.option.integrator = 0.004, "implicitfast"
     root.compiler.angle = "radian"
     owners, floors = {}, [s.elevation for s in house.storeys]
+    leaves = _leaves_ajar(house, catalogue)
     for g in range(model.ngeom):
         if model.geom_type[g] != mujoco.mjtGeom.mjGEOM_BOX:
             continue
@@ -213,11 +222,35 @@ def house_arena(house: House, catalogue: Catalogue) -> tuple[composer.Arena, dic
             continue
         quat = np.zeros(4)
         mujoco.mju_mat2Quat(quat, data.geom_xmat[g])
-        root.worldbody.add(
-            "geom", name=f"box{g}", type="box", size=model.geom_size[g], pos=data.geom_xpos[g], quat=quat
-        )
-        owners[f"box{g}"] = owner_of_name(model.geom(g).name)
+        owner = owners[f"box{g}"] = owner_of_name(model.geom(g).name)
+        box = {"name": f"box{g}", "type": "box", "size": model.geom_size[g]}
+        if f"{owner}#0" in leaves:
+            _hang(root, owner, *leaves[f"{owner}#0"], {**box, "pos": data.geom_xpos[g], "mass": LEAF_MASS})
+        else:
+            root.worldbody.add("geom", pos=data.geom_xpos[g], quat=quat, **box)
     return arena, owners
+
+
+def _leaves_ajar(house: House, catalogue: Catalogue) -> dict[str, tuple[np.ndarray, float, float]]:
+    """Hinge, metres, yaw, radians, and how far it turned from being closed, of the leaves that stand ajar."""
+    poses, ajar = {}, ajar_doors(house)
+    for o in house.openings:
+        if o.id in ajar:
+            shut = leaf_poses(house, dataclasses.replace(o, angle=0.0), catalogue.finish)
+            for name, (hinge, yaw) in leaf_poses(house, o, catalogue.finish).items():
+                poses[name] = np.array(hinge), yaw, yaw - shut[name][1]
+    return poses
+
+
+def _hang(root: mjcf.RootElement, owner: str, hinge: np.ndarray, yaw: float, turn: float, box: dict[str, Any]) -> None:
+    """Put the box of a leaf on hinges; it meets bodies alone."""
+    opening, _, piece = owner.partition("/")
+    leaf = root.worldbody.add("body", name=owner.replace("/", "_"), pos=hinge, quat=yaw_quat(yaw))
+    joint = f"{opening}_{'right' if piece == 'leaf_2' else ''}doorhinge"
+    limits = {"range": [0, WIDEST], "limited": True, "ref": abs(turn), "axis": [0, 0, math.copysign(1.0, turn)]}
+    leaf.add("joint", name=joint, type="hinge", **limits, **HINGE)
+    pos = [*(rotation(-yaw) @ (box["pos"] - hinge)[:2]), box["pos"][2] - hinge[2]]
+    leaf.add("geom", **{**box, "pos": pos}, contype=2, conaffinity=2)
 
 
 def is_overhead(low: float, high: float, floors: Sequence[float]) -> bool:

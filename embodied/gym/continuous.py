@@ -201,7 +201,7 @@ class ContinuousGymEnv(LiveEnv):
 
     def pixels(self) -> dict[str, np.ndarray]:
         """rgb (h, w, 3) uint8 and depth (h, w) float32, metres along the optical axis."""
-        camera, world = self.dataset.camera, self.dataset.world(self.play.episode.world)
+        camera, world = self.dataset.camera, self._seen()
         pose = camera_at(self.play.eye, self.play.yaw, self.play.pitch, camera.vfov)
         return live_pixels(world, pose, (camera.height, camera.width), self.dataset.observations)
 
@@ -216,7 +216,11 @@ class ContinuousGymEnv(LiveEnv):
     def _picture(self) -> np.ndarray:
         camera = dataclasses.replace(self.dataset.camera, height=VIEW[0], width=VIEW[1])
         pose = camera_at(self.play.eye, self.play.yaw, self.play.pitch, camera.vfov)
-        return self.dataset.world(self.play.episode.world).renderer.rgb(pose, VIEW)
+        return self._seen().renderer.rgb(pose, VIEW)
+
+    def _seen(self) -> World:
+        """The house with the doors that were pushed."""
+        return self.dataset.world(self.play.episode.world).with_doors(dict.fromkeys(self.play.pushed, 1.0))
 
     def close(self) -> None:
         for world in self.dataset.opened.values():

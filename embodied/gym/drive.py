@@ -90,7 +90,7 @@ class DriveEnv(LiveEnv):
         return self.driving.look(), outcome.reward, terminated, truncated, info
 
     def _picture(self) -> np.ndarray:
-        return self.driving.world.renderer.rgb(self.driving.camera(), VIEW)
+        return self.driving.seen.renderer.rgb(self.driving.camera(), VIEW)
 
     def close(self) -> None:
         self.driving.close()

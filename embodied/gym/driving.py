@@ -25,6 +25,7 @@ from embodied.language.plain_language import with_article
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.navigation.free_space import EYE
 from embodied.render.camera import Camera, camera_at
+from embodied.scene.doors import openness
 from embodied.tasks.goals import NOT_OBJECTS, footprint_distance
 
 if TYPE_CHECKING:
@@ -276,7 +277,13 @@ class Driving:
     def look(self) -> dict[str, np.ndarray]:
         """The observation: pixels, motion, touch and goal."""
         s = self.settings
-        return {**live_pixels(self.world, self.camera(), (s.height, s.width), s.observations), **self.proprioception()}
+        return {**live_pixels(self.seen, self.camera(), (s.height, s.width), s.observations), **self.proprioception()}
+
+    @property
+    def seen(self) -> World:
+        """The house with the doors that were pushed, to a tenth."""
+        driver = self.driver
+        return self.world.with_doors({d: round(x, 1) for d, x in openness(driver.model, driver.data).items()})
 
     def proprioception(self) -> dict[str, np.ndarray]:
         """The observation without pixels."""

@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from embodied.house.house import House
+from embodied.navigation.free_space import ajar_doors, opened
 from embodied.navigation.graph import reachable
 
 SLIDE = 0.05
@@ -21,11 +22,12 @@ class FloorWays:
     """The cells, 10 cm apart, that the centre of a body of the agent's radius can reach, and ways over them."""
 
     def __init__(self, house: House, storey: int = 0) -> None:
-        """
+        """Doors that stand ajar give way to the body.
+
         Raises:
           HouseError: there is no free floor at all.
         """
-        grid, room_of_cell, reach = reachable(house, storey)
+        grid, room_of_cell, reach = reachable(opened(house, ajar_doors(house)), storey)
         cells = np.flatnonzero(reach)
         self.xy = grid.xy[cells]
         """(n, 2) metres, world."""

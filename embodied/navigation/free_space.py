@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 import shapely
@@ -21,9 +22,11 @@ JAMB = 0.03
 """Width that a door's lining and the play of its leaf take from its hole on each side, metres."""
 LEAF = 0.05
 """Thickness of an open leaf with its handle, metres."""
-OPEN_FROM = 0.4
-"""Openness from which a door counts as open: Habitat's. A leaf of 0.75 m then leaves 0.46 m, and the agent needs 0.4.
-MolmoSpaces says 0.67, RoboCasa 0.9."""
+OPEN_FROM = 0.5
+"""Openness from which a door counts as open: the agent's body then passes. Habitat has 0.4, MolmoSpaces 0.67, RoboCasa
+0.9."""
+LATCHED = 0.005
+"""Openness up to which a door is shut fast, as RoboCasa's; a body pushes open what stands wider."""
 
 
 def free_floor(house: House, storey: int) -> shapely.Geometry:
@@ -87,10 +90,14 @@ def closed_doors(house: House, threshold: float = OPEN_FROM) -> frozenset[str]:
     return frozenset(o.id for o in room_doors(house) if o.angle < threshold * WIDEST)
 
 
-def opened(house: House, threshold: float = OPEN_FROM) -> House:
-    """The house with its closed doors wide open."""
-    closed = closed_doors(house, threshold)
-    return Moment(openness=dict.fromkeys(sorted(closed), 1.0)).applied(house) if closed else house
+def ajar_doors(house: House) -> frozenset[str]:
+    """Doors that count as closed and are not shut fast."""
+    return closed_doors(house) - closed_doors(house, LATCHED)
+
+
+def opened(house: House, doors: Collection[str]) -> House:
+    """The house with some doors wide open."""
+    return Moment(openness=dict.fromkeys(sorted(doors), 1.0)).applied(house) if doors else house
 
 
 def doors_of_edges(positions: np.ndarray, edges: np.ndarray, house: House) -> dict[tuple[int, int], tuple[str, ...]]:

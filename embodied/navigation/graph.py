@@ -178,7 +178,7 @@ def build_graph(house: House, *, spacing: float = 2.25, open_from: float = OPEN_
     Examples:
       >>> graph = embodied.build_graph(house)
     """
-    rest, house = house, opened(house, open_from)
+    rest, house = house, opened(house, closed_doors(house, open_from))
     positions: list[tuple[float, float, float]] = []
     rooms: list[str] = []
     edges: list[tuple[int, int]] = []
@@ -216,7 +216,7 @@ def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list
 
 def unreachable_rooms(house: House) -> tuple[str, ...]:
     """Ids of rooms that a body of the agent's radius cannot enter from the rest of their storey, all doors open."""
-    house, closed = opened(house), []
+    house, closed = opened(house, closed_doors(house)), []
     for storey in range(len(house.storeys)):
         rooms = [r for r in house.rooms if r.storey == storey]
         _, room_of_cell, reach = reachable(house, storey)
