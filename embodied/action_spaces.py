@@ -148,7 +148,7 @@ def node_ahead(graph: NavGraph, pose: Pose) -> int | None:
 
 def door_actions(o: Observation) -> dict[str, Action]:
     """Doors that can be opened and closed now, by the name that language models and agents over HTTP call it."""
-    return {f"open {k}": Open(k) for k in o.can_open} | {f"close {k}": Close(k) for k in o.can_close}
+    return {**{f"open {k}": Open(k) for k in o.can_open}, **{f"close {k}": Close(k) for k in o.can_close}}
 
 
 def doors_moved(step: Step, graph: NavGraph, closed: frozenset[str]) -> frozenset[str]:

@@ -272,6 +272,6 @@ class HalfwaySkyline(PerEpisodePolicy):
 
 
 def _random_move(o: Observation, rng: np.random.Generator) -> Action:
-    moves = [Move(int(k)) for k in np.flatnonzero(o.candidates.allowed)]
-    possible = [*moves, *map(Open, o.can_open), Stop()]
+    possible: list[Action] = [Move(int(k)) for k in np.flatnonzero(o.candidates.allowed)]
+    possible += [*map(Open, o.can_open), Stop()]
     return possible[int(rng.integers(len(possible)))]
