@@ -111,18 +111,20 @@ class SightedRun(Recorded, Run, Encoded, WithDevice):
 
 
 def training_data(args: Any, kind: str, device: str = "cpu") -> TrainingData:
-    """Training data by options of WithData and Encoded; under torchrun, PyTorch has its device.
+    """Training data by options of WithData and Encoded.
 
     Raises:
       DatasetError: a data set of another kind.
+      UnableError: there is no such device.
     """
-    from embodied.agents.common.parallel import join_launcher
+    from embodied.agents.common.parallel import check_device
     from embodied.agents.vision.encoder import load_encoder
     from embodied.agents.vision.training_data import TrainingData
     from embodied.datasets.store import dataset_of
 
+    check_device(device)
     data, encoder = dataset_of(args.data, kind), load_encoder(args.encoder)
-    return TrainingData(data, encoder, args.pictures, join_launcher(device), cache=args.cache)
+    return TrainingData(data, encoder, args.pictures, device, cache=args.cache)
 
 
 # Studies ------------------------------------------------------------------------------------------

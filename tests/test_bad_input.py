@@ -126,7 +126,7 @@ def test_an_error_stands_on_a_line_of_its_own_below_a_progress_bar(capsys, monke
 @pytest.mark.slow
 def test_a_killed_worker_is_one_line(capsys, monkeypatch):
     def fail(_):
-        for_each_unit(signal.raise_signal, [signal.SIGKILL] * 2, (), workers=2, watch=None, ray_address=None)
+        for_each_unit(signal.raise_signal, [signal.SIGKILL] * 2, (), workers=2, watch=None)
 
     monkeypatch.setattr(doctor, "run", functools.wraps(doctor.run)(fail))
     assert cli.main(["doctor"]) == 2

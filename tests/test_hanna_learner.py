@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-import datetime as dt
 import functools
 import itertools
 import json
 import math
 import os
 import signal
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-import torch.distributed as dist
 from hand_data import validations_of
 from hand_worlds import grid_world
 
@@ -23,7 +20,6 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
 from embodied.agents.common.checkpoint import CheckpointError, restore
 from embodied.agents.common.choosing import choose_at, choose_greedily, choose_sampled
-from embodied.agents.common.imitation import REPORTED, SUMMED
 from embodied.agents.common.playing import play_with_memory
 from embodied.agents.common.session import (
     DivergedError,
@@ -531,40 +527,3 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
     agent = agent_for(split, dataclasses.replace(config, iterations=21))
     imitation.train(HannaLearner(agent, split, HannaTeacher()), split, tmp_path, identity(agent), note=note)
     assert "continuing after update 20" in said and said[-1].startswith("21/21")
-
-
-def gradients_of_a_share(rank: int, folder: str) -> None:
-    """One of two processes: its share of one update, and the gradient that it then has."""
-    patience = dt.timedelta(minutes=3)
-    dist.init_process_group("gloo", f"file://{folder}/meet", patience, world_size=2, rank=rank)
-    try:
-        save_gradients(Path(folder) / f"{rank}.pt")
-    finally:
-        dist.destroy_process_group()
-
-
-def save_gradients(path: Path) -> None:
-    torch.set_num_threads(1)
-    split = setting()
-    agent = agent_for(split, dataclasses.replace(TINY, dropout=0.0, environment_dropout=0.0, guided_asking=0.0))
-    numbers = HannaLearner(agent, split, HannaTeacher()).learn(0)
-    torch.save([p.grad for p in agent.network.parameters()], path)
-    path.with_suffix(".json").write_text(json.dumps(numbers))
-
-
-@pytest.mark.slow
-def test_two_processes_learn_what_one_would(tmp_path):
-    other = torch.multiprocessing.spawn(gradients_of_a_share, (str(tmp_path),), nprocs=1, join=False)
-    gradients_of_a_share(1, str(tmp_path))
-    other.join()
-    save_gradients(tmp_path / "alone.pt")
-    alone, first, second = (torch.load(tmp_path / f"{n}.pt", weights_only=True) for n in ("alone", "0", "1"))
-    for a, b, c in zip(alone, first, second, strict=True):
-        assert (a is None) == (b is None) == (c is None)
-        if a is not None:
-            assert torch.equal(b, c)
-            assert torch.allclose(a, b, atol=1e-4, rtol=1e-3)
-    alone, *both = (json.loads((tmp_path / f"{n}.json").read_text()) for n in ("alone", "0", "1"))
-    assert set(alone) <= set(REPORTED) and both[0] == both[1]
-    for name in (*SUMMED, "gradient", "success", "requests"):
-        assert both[0][name] == pytest.approx(alone[name], rel=1e-3), name

@@ -7,7 +7,7 @@ for update in session:
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Unpack
@@ -15,7 +15,6 @@ from typing import Any, ClassVar, Unpack
 import torch
 from torch import Tensor
 
-from embodied.agents.common import parallel
 from embodied.agents.common.playing import TaskSet, play_with_memory
 from embodied.agents.common.session import (
     Options,
@@ -93,18 +92,18 @@ class ImitationLearner:
         return self.agent.policy(split.bank)
 
     def learn(self, update: int) -> Mapping[str, float]:
-        """One update: play a batch, compute its loss, take a gradient step; the numbers to report, those of REPORTED.
+        """One update: play a batch, compute its loss, take a gradient step; the numbers to report.
 
         Raises:
           DivergedError: the loss or a gradient is not finite (weights are as before).
           UnableError: memory ran out.
         """
         config, training = self.config, self.training
-        chosen = parallel.share(tasks_of_update(training.tasks, update, config.batch, config.seed))
+        chosen = tasks_of_update(training.tasks, update, config.batch, config.seed)
         tasks, seed = [self.training_task(t) for t in chosen], episode_seed(config.seed, update)
         player = self.player(update, training.bank)
         try:
-            with seeded_dropout(config.seed + parallel.rank(), update):
+            with seeded_dropout(config.seed, update):
                 self.network.train()
                 episodes, memory = play_with_memory(training.make_env, player, tasks, seed=seed)
                 experience = self.experience(episodes, memory)
@@ -115,8 +114,7 @@ class ImitationLearner:
         except torch.OutOfMemoryError as e:
             raise UnableError(f"out of memory at update {update}: use a smaller batch than {config.batch}") from e
         losses = [float(x.detach()) for x in batch_loss.losses]
-        numbers = {"loss navigation": losses[0], "loss asking": losses[1], "gradient": norm, **batch_loss.numbers}
-        return parallel.reduce_metrics(numbers, REPORTED, SUMMED, batch_loss.loss.device)
+        return {"loss navigation": losses[0], "loss asking": losses[1], "gradient": norm, **batch_loss.numbers}
 
 
 def train(
@@ -128,7 +126,7 @@ def train(
     """
     tasks, about = learner.training.tasks, learner.agent.about
     size = sum(p.numel() for p in learner.network.parameters())
-    parallel.rank_zero(options.get("note", print))(
+    options.get("note", print)(
         f"{len(tasks)} tasks in {len({t.world for t in tasks})} houses, {len(about.words)} words, {size:,} parameters, "
         f"pictures: {about.pictures}"
     )
@@ -137,22 +135,6 @@ def train(
     done = run(folder, identity, parts, learner.config, learner.learn, judge, may_change=MAY_CHANGE, **options)
     learner.network.eval()
     return done
-
-
-REPORTED = (
-    "loss navigation",
-    "loss asking",
-    "gradient",
-    "right moves",
-    "steps",
-    "success",
-    "requests",
-    "should ask",
-    "right asks",
-)
-"""Numbers reported of an update; the last two only where help could be asked for."""
-SUMMED: Collection[str] = ("loss navigation", "loss asking", "steps")
-"""Those that are sums over the batch, of which every process has a share."""
 
 
 def played(episodes: Sequence[Episode], worlds: Mapping[str, Place]) -> dict[str, float]:

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any, Self, TypedDict, TypeVar, Unpack
 
 import torch
 
-from embodied.agents.common import parallel
 from embodied.agents.common.checkpoint import Stateful, restore, write_checkpoint
 from embodied.assets.cache import write_json
 from embodied.errors import UnableError
@@ -68,8 +67,7 @@ class Session:
                     session.record({"success": ...})            # what a validation found
                     if session.improved(success): keep(...)
 
-    What the body did with an update counts, and is saved, when the next one is asked for. Of several processes
-    (embodied.agents.common.parallel) the first writes.
+    What the body did with an update counts, and is saved, when the next one is asked for.
     """
 
     def __init__(
@@ -101,7 +99,7 @@ class Session:
         """Of what is being counted, such as a pass; the caller empties it."""
         self.history: list[dict[str, float]] = []
         """Results so far, such as one entry per validation."""
-        self._note = parallel.rank_zero(note)
+        self._note = note
         self._may_change, self._minutes, self._saved_every, self._every = may_change, minutes, checkpoint_minutes, every
         self._means: dict[str, list[float]] = {}
         self._writer: SummaryWriter | None = None
@@ -114,15 +112,13 @@ class Session:
           CheckpointError: damaged, or of a run with another identity.
         """
         with contextlib.ExitStack() as stack:
-            if parallel.rank() == 0:
-                stack.enter_context(locked(self.folder))
+            stack.enter_context(locked(self.folder))
             if self.path.exists():
                 body = restore(self.path, self.identity, self.parts, self._may_change)
                 self.progress = Progress(**body["progress"])
                 self.sums, self.history = body["sums"], body["history"]
                 self._note(f"continuing after update {self.progress.update}")
-            if parallel.rank() == 0:
-                write_json(self.folder / "settings.json", dict(self.identity), indent=1)
+            write_json(self.folder / "settings.json", dict(self.identity), indent=1)
             self._stop = stack.enter_context(stop_signal())
             self._stack = stack.pop_all()
         return self
@@ -188,7 +184,7 @@ class Session:
           KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
         """
         began = saved = self._since = time.monotonic()
-        used, before, first = time.process_time(), self.progress, parallel.rank() == 0
+        used, before = time.process_time(), self.progress
         while self.progress.update < self.total:
             yield self.progress.update
             now = time.monotonic()
@@ -201,9 +197,9 @@ class Session:
             last = self.progress.update == self.total
             if self._means and (self.progress.update % self._every == 0 or last):
                 self._report()
-            stopped = parallel.any_rank(self._stop.is_set(), self._device)
-            late = parallel.any_rank(self._minutes is not None and now - began > 60 * self._minutes, self._device)
-            if first and (last or stopped or late or now - saved > 60 * self._saved_every):
+            stopped = self._stop.is_set()
+            late = self._minutes is not None and now - began > 60 * self._minutes
+            if last or stopped or late or now - saved > 60 * self._saved_every:
                 self.save()
                 saved = now
             if stopped or (late and not last):
@@ -212,11 +208,6 @@ class Session:
                 if stopped:
                     raise KeyboardInterrupt
                 return
-
-    @property
-    def _device(self) -> torch.device:
-        modules = (p for part in self.parts.values() if isinstance(part, torch.nn.Module) for p in part.parameters())
-        return next(modules, torch.zeros(0)).device
 
     def _report(self) -> None:
         """Say, and log, the means of what was counted since the last report."""
@@ -230,7 +221,7 @@ class Session:
         self._means, self._since = {}, time.monotonic()
 
     def _log(self, kind: str, numbers: Mapping[str, float], update: int | None = None) -> None:
-        if parallel.rank() or not numbers:
+        if not numbers:
             return
         at = self.done if update is None else update
         if self._writer is None:
@@ -268,8 +259,7 @@ def run(
       identity: all that the run depends on.
       config: settings over ValidatedRunSettings.
       step: does an update, and returns the numbers to report.
-      validate: evaluates, keeps the weights if they are the best, and returns the episodes; called in the first of
-        several processes.
+      validate: evaluates, keeps the weights if they are the best, and returns the episodes.
       may_change: names of settings that may differ on resuming.
 
     Raises:
@@ -284,7 +274,7 @@ def run(
     with Session(folder, identity, parts, config.iterations, **how) as session:
         for update in session:
             session.add(step(update))
-            if session.due(config.validate_every) and parallel.rank() == 0:
+            if session.due(config.validate_every):
                 episodes, watch = validate(session), options.get("on_validation")
                 if watch is not None:
                     watch(session.done, episodes)
@@ -344,8 +334,7 @@ def within_standard_error(success: float, best: float, episodes: int) -> bool:
 
 
 def descend(loss: torch.Tensor, optimizer: torch.optim.Optimizer, what: str, clip: float = math.inf) -> float:
-    """One step of `optimizer` down `loss`, gradients added up over processes and their norm cut to `clip`; returns the
-    norm before.
+    """One step of `optimizer` down `loss`, the norm of gradients cut to `clip`; returns the norm before.
 
     Args:
       what: names the update, for messages.
@@ -356,7 +345,6 @@ def descend(loss: torch.Tensor, optimizer: torch.optim.Optimizer, what: str, cli
     optimizer.zero_grad(set_to_none=True)
     loss.backward()
     parameters = [p for group in optimizer.param_groups for p in group["params"]]
-    parallel.add_gradients(parameters)
     if clip < math.inf:
         norm = torch.nn.utils.clip_grad_norm_(parameters, clip)
     else:

@@ -97,14 +97,8 @@ def _learned_in(source: StripSource, config: StripTraining) -> Identity:
 # Features ----------------------------------------------------------------------------------------
 
 
-def make_features(
-    extract: Extractor, names: Sequence[str], *, workers: int = 1, ray: str | None = None, note: Note = print
-) -> None:
-    """Extract the missing features of some houses.
-
-    Args:
-      ray: address of a Ray cluster to use instead of `workers`.
-    """
+def make_features(extract: Extractor, names: Sequence[str], *, workers: int = 1, note: Note = print) -> None:
+    """Extract the missing features of some houses."""
 
     def watch(lines: Iterable[str], total: int) -> Iterable[str]:
         for line in lines:
@@ -112,7 +106,7 @@ def make_features(
             yield line
 
     missing = [n for n in names if extract.missing(n)]
-    for_each_unit(extract, missing, (), workers=workers, watch=watch, ray_address=ray)
+    for_each_unit(extract, missing, (), workers=workers, watch=watch)
     data = Dataset(extract.data)
     count = Counter(drawing(pictures_of(data, n, extract.picture_kind)) for n in names)
     ways = ", ".join(f"{n} {way}" for way, n in sorted(count.items()))

@@ -67,8 +67,6 @@ class DatasetOptions(Furnished, Printed):
     """Side of a panorama's cube face (default: as are there, else 256)."""
     workers: Count = 2
     """Build with N processes."""
-    ray: Annotated[str | None, Option(metavar="ADDRESS")] = None
-    """Use a Ray cluster instead: its address, or 'local'."""
 
 
 def from_people(args: DatasetOptions) -> None:
@@ -116,10 +114,10 @@ def run(args: DatasetOptions) -> None:
         ood=args.ood,
     )
     watch = lambda jobs, total: tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
-    if args.ray in (None, "local") and not (args.out / "dataset.json").exists():
+    if not (args.out / "dataset.json").exists():
         wanted = chosen_pictures(args.kind, args.pictures, args.size, None)
         check_machine("none" if wanted is None else wanted.word)
-    how: dict[str, Any] = {"workers": args.workers, "watch": watch, "ray_address": args.ray}
+    how: dict[str, Any] = {"workers": args.workers, "watch": watch}
     build_dataset(config, args.out, args.cache, own=args.own, **how)
     data = Dataset(args.out)
     pictures = chosen_pictures(args.kind, args.pictures, args.size, data.pictures)

@@ -25,8 +25,6 @@ class FeatureOptions(WithData, Encoded, WithDevice):
     goal_image: tuple[Annotated[str, Option(words=GOAL_IMAGES)], ...] = ()
     """Also make features of goal images that differ from what the agent sees there; later-camera: taken at another hour
     of another day, with people elsewhere and small things moved, by a robot's camera; same: identical."""
-    ray: Annotated[str | None, Option(metavar="ADDRESS")] = None
-    """Use a Ray cluster instead: its address, or 'local'."""
 
 
 def run(args: FeatureOptions) -> None:
@@ -41,4 +39,4 @@ def run(args: FeatureOptions) -> None:
     goal_images = (SAME_TIME, *args.goal_image)
     extract = Extractor(data.folder.resolve(), encoder, args.cache, args.pictures, goal_images, args.threads)
     names = list(dict.fromkeys(name for split in args.split or data.splits for name in data.names(split)))
-    make_features(extract, names, workers=args.workers, ray=args.ray, note=note)
+    make_features(extract, names, workers=args.workers, note=note)

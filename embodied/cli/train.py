@@ -3,9 +3,7 @@
     embodied train hanna --data DATA --out RUN
     embodied train my_learner:LEARNER --data DATA --out RUN
 
-Rerun an interrupted command to resume; the result is the same. `tensorboard --logdir DIR` shows the curves. On several
-GPUs run `torchrun --nproc-per-node N --no-python embodied train hanna --device cuda ...`, and on several cores the same
-without --device.
+Rerun an interrupted command to resume; the result is the same. `tensorboard --logdir DIR` shows the curves.
 """
 
 from __future__ import annotations

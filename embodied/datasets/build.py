@@ -164,7 +164,6 @@ def build_dataset(
     make_house: HouseMaker | None = None,
     watch: Watch | None = None,
     own: tuple[Path, ...] = (),
-    ray_address: str | None = None,
 ) -> Path:
     """Build what is missing of the data set in `folder` and write its index; returns the index.
 
@@ -173,7 +172,6 @@ def build_dataset(
     Args:
       watch: wraps the iterator over finished house names, with their number (a progress bar).
       own: folders with a groups.toml of the user's own each (docs/assets.md); without models, which readers would lack.
-      ray_address: run on a Ray cluster, which must see `folder` under the same path.
 
     Raises:
       ValueError: the folder holds another data set; a folder of `own` has no groups.toml, or a wrong one, or models.
@@ -189,7 +187,7 @@ def build_dataset(
     arguments = (config, folder.resolve(), Path(cache), make_house or make_dataset_house, own)
     with locked(folder):
         _claim(folder, config)
-        for_each_unit(build_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
+        for_each_unit(build_unit, work, arguments, workers=workers, watch=watch)
         return write_index(config, folder)
 
 
@@ -201,7 +199,6 @@ def draw_panoramas(
     pictures: PictureSettings | str,
     workers: int = 1,
     watch: Watch | None = None,
-    ray_address: str | None = None,
 ) -> None:
     """Draw the panoramas of all houses into their folders, unless they are there; a lit house is lit first.
 
@@ -210,7 +207,7 @@ def draw_panoramas(
 
     Args:
       pictures: how all of them are drawn, as in embodied.open_world.
-      workers, watch, ray_address: as in `build_dataset`.
+      workers, watch: as in `build_dataset`.
 
     Raises:
       LockedError: another process writes into the folder.
@@ -222,7 +219,7 @@ def draw_panoramas(
     arguments = (Path(folder).resolve(), Path(cache), parse_pictures(pictures))
     work = units(config.plan)
     with locked(Path(folder)):
-        for_each_unit(draw_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
+        for_each_unit(draw_unit, work, arguments, workers=workers, watch=watch)
 
 
 def draw_unit(unit: Unit, folder: Path, cache: Path, pictures: PictureSettings) -> str:
@@ -230,7 +227,7 @@ def draw_unit(unit: Unit, folder: Path, cache: Path, pictures: PictureSettings) 
     home = folder / "houses" / unit.name
     house, graph = House.load(home / "house.json"), from_matterport(home / "connectivity.json")
     catalogue = load_catalogue(cache)
-    path, may = home / "panoramas.pano", ("renderer",)  # nodes of a cluster may have other drivers
+    path, may = home / "panoramas.pano", ("renderer",)  # another machine may have drawn it
     new = not path.exists()
     with World(house, catalogue, graph, cache, pictures, file=path, ignore_fields=may) as world:
         share(world.cached_path, path)
@@ -253,23 +250,12 @@ def share(source: Path, target: Path) -> None:
 
 
 def for_each_unit(
-    job: Callable[..., str],
-    work: Sequence[W],
-    arguments: tuple,
-    *,
-    workers: int,
-    watch: Watch | None,
-    ray_address: str | None,
+    job: Callable[..., str], work: Sequence[W], arguments: tuple, *, workers: int, watch: Watch | None
 ) -> None:
-    """Run job(unit, *arguments) for every unit of work, on this machine's processes or on a Ray cluster."""
-    if ray_address is not None:
-        from embodied.datasets.cluster import run_on_ray  # an optional extra
-
-        done = run_on_ray(job, work, arguments, ray_address)
-    else:
-        done = joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(
-            joblib.delayed(_lasting)(job, u, *arguments) for u in work
-        )
+    """Run job(unit, *arguments) for every unit of work, in processes."""
+    done = joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(
+        joblib.delayed(_lasting)(job, u, *arguments) for u in work
+    )
     for _ in watch(done, len(work)) if watch else done:
         pass
 
