@@ -13,10 +13,12 @@ import pytest
 from conftest import two_rooms
 from hand_light import TINY
 from handmade import smooth_pages
+from test_scene import Unpainted
 
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.moving_parts import OPENING_CLASSES, taken_apart
 from embodied.assets.records import bounds
+from embodied.generate import generate_house
 from embodied.generate.left_open import free_openness, left_open
 from embodied.house.house import House, HouseError, Placement
 from embodied.house.moment import Moment, apart
@@ -25,7 +27,7 @@ from embodied.light import bake
 from embodied.light.moving import MovingHouse
 from embodied.scene.doors import openness
 from embodied.scene.export import export_mjcf
-from embodied.scene.model import build_spec, takeable
+from embodied.scene.model import build_spec, loose, takeable
 
 CATALOGUE = load_catalogue()
 EXPECTED = {
@@ -211,3 +213,47 @@ def test_what_is_left_open_follows_from_the_seed_and_meets_nothing():
     ]
     walled = dataclasses.replace(HOUSE, placements=tuple(turned))
     assert free["fridge_1/door_2"] == 1.0 and free_openness(walled, CATALOGUE)["fridge_1/door_2"] < 0.3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2))
+def test_nearly_all_of_a_house_opens_by_seventy_degrees_and_loose_things_rest_for_ten_seconds(seed, shared_cache):
+    catalogue = load_catalogue(shared_cache)
+    house = generate_house(seed, catalogue=catalogue)
+    free, carry = takeable(house, catalogue), {p.parent for p in house.placements if "chair" not in (p.parent or "")}
+    aside = loose(house, catalogue) - carry
+    rest = build_spec(house, Unpainted(catalogue), hinged=True, free=free).compile()
+    data = mujoco.MjData(rest)
+    mujoco.mj_forward(rest, data)
+    start, shut = data.xpos.copy(), openness(rest, data)
+    for _ in range(2500):
+        mujoco.mj_step(rest, data)
+    astray = np.linalg.norm(data.xpos - start, axis=1) > 0.02
+    assert astray.sum() <= 1 and (data.tree_asleep >= 0).all()
+    assert openness(rest, data) == pytest.approx(shut, abs=1e-3)
+    model = build_spec(house, Unpainted(catalogue), hinged=True).compile()
+    data, widths = mujoco.MjData(model), {}
+    for j in range(model.njnt):
+        if "_handle" not in model.joint(j).name:
+            reach = model.jnt_user[j, 0] or math.pi / 2
+            met = (far for far in np.linspace(0, 1, 10)[1:] if _meets(model, data, j, far * reach, aside))
+            widths[model.joint(j).name] = next(met, 1.0)
+    narrow = {name: far for name, far in widths.items() if far < 70 / 90}
+    assert len(narrow) <= 0.06 * len(widths), narrow
+    assert not any(re.match("door_", name) for name in narrow), narrow  # nobody is locked in
+
+
+def _meets(model, data, joint: int, value: float, aside: frozenset[str]) -> bool:
+    """True where what turns about a joint is in what nobody moves aside."""
+    mujoco.mj_resetData(model, data)
+    data.qpos[model.jnt_qposadr[joint]] = value
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_collision(model, data)
+    turns = {int(model.jnt_bodyid[joint])}
+    turns |= {b for b in range(model.nbody) if int(model.body_parentid[b]) in turns}
+    for contact in data.contact[: data.ncon]:
+        sides = [int(model.geom_bodyid[g]) in turns for g in contact.geom]
+        other = model.geom(contact.geom[sides.index(False)]).name if sides[0] != sides[1] else ""
+        if other and contact.dist < -0.002 and re.split("[#/]", other)[0] not in aside:
+            return True
+    return False
