@@ -20,26 +20,18 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from embodied.assets.built.parametric import plain
+from embodied.assets.built.parametric import PLAIN
 from embodied.assets.built.primitives import Shape, box, cylinder, lathe, part, tube
 from embodied.assets.records import Finish, MeshPart
+from embodied.assets.rows import DATA, Row, read_json
 
 OPEN = "open/"
 """Start of the params of a placement that say how far its parts are open: ('open/left_door', 0.7)."""
-FLAPS, ROUND, LIDS = {"cooker", "toaster oven"}, {"washing machine", "tumble dryer"}, {"toilet", "chest freezer"}
-"""Classes whose doors hang at their lower edge, if the handle is in the middle; are round; that have a lid."""
-CUPBOARDS = set(
-    """base cabinet;bathroom vanity;bedside table;changing table;corner base cabinet;corner wall cabinet;cupboard;desk
-    double vanity;drawer cabinet;dresser;dressing table;filing cabinet;fridge;glass-door cabinet;kitchen island
-    kitchen sink;locker;media cabinet;microwave;office cabinet;oven cabinet;safe;sideboard;tall cabinet;tv stand
-    wall cabinet;wall unit;wardrobe;workbench""".replace("\n    ", ";").split(";")
-)
-OPENING_CLASSES = frozenset(CUPBOARDS | FLAPS | ROUND | LIDS)
-"""Classes in whose models moving parts are looked for."""
-ONLY_DOORS = {"microwave", "safe", "wall cabinet", "corner base cabinet"}
-"""Classes that have no drawers: what looks like one is a panel of controls, or fixed."""
-BASINS, BASIN = {"kitchen sink", "bathroom vanity", "double vanity"}, 0.16
-"""Classes that hold a basin, which reaches so many metres below the upper edge of a front."""
+_ROWS = read_json(DATA / "opening.json")
+OPENING_CLASSES = frozenset(_ROWS)
+"""Classes in whose models moving parts are looked for. A row may have a "kind": "flap" (doors hang at their lower edge
+where the handle is in the middle), "round" or "lid"; "only_doors" where what looks like a drawer is fixed; a "basin"
+that reaches so many metres below the upper edge of a front; the "skin" of its inside; and what it "holds"."""
 FULL_TURN = {"door": math.pi / 2, "flap": 1.45, "lid": 1.5}
 """Radians at openness 1; a drawer comes out by PULL of its depth."""
 PULL = 0.75
@@ -55,14 +47,7 @@ GRIP, OFF_CENTRE = 0.007, 0.25
 """Metres that handles stand out at least, and the distance of a door's from the middle of its front, in widths."""
 RIM, BACK, STEP = 0.014, 0.02, 0.34
 """Metres between an inside and the edge of its front, and the back of the thing, and about between shelves."""
-WHITE, STEEL, DARK = plain((0.86, 0.86, 0.84), 0.5), plain((0.6, 0.6, 0.6), 0.3, 1.0), plain((0.12, 0.12, 0.12), 0.5)
-TINTS = [
-    plain(c, 0.7, specular=0.2)
-    for c in ((0.85, 0.84, 0.8), (0.33, 0.42, 0.52), (0.72, 0.6, 0.45), (0.45, 0.5, 0.42), (0.62, 0.4, 0.38))
-]
-KITCHEN = {"base cabinet", "drawer cabinet", "wall cabinet", "tall cabinet", "kitchen island", "glass-door cabinet"}
-CLOSETS = {"wardrobe", "dresser", "bedside table", "sideboard", "changing table", "bathroom vanity", "tv stand"}
-"""Classes that hold crockery, and cloth."""
+TINTS = ("plate/white", "plate/blue", "plate/sand", "soap/green", "mug/red")
 FIXED, WITHIN = -1, -2
 XZ = [0, 2]
 Corners = tuple[np.ndarray, np.ndarray]
@@ -140,10 +125,10 @@ def taken_apart(object_class: str, parts: tuple[MeshPart, ...]) -> TakenApart | 
     Args:
       parts: the meshes of a thing that is closed, in its own frame.
     """
-    if object_class not in OPENING_CLASSES:
+    if (row := _ROWS.get(object_class)) is None:
         return None
     s = _Pieces.of(parts)
-    moving = _named(_lids(s) if object_class in LIDS else _fronts(s, object_class))
+    moving = _named(_lids(s) if row.get("kind") == "lid" else _fronts(s, row))
     if not moving:
         return None
     label = np.full(len(s.low), FIXED)
@@ -152,7 +137,7 @@ def taken_apart(object_class: str, parts: tuple[MeshPart, ...]) -> TakenApart | 
     held = [_within(s, m.inside) & (label == FIXED) for m in moving]
     label[np.any(held, axis=0)] = WITHIN
     labels = tuple(label[of] for of in s.of_face)
-    holes = tuple(_hole(m, object_class in ROUND) for m in moving if m.cut)
+    holes = tuple(_hole(m, row.get("kind") == "round") for m in moving if m.cut)
     fixed = []
     for p in _where(parts, labels, FIXED):
         rows, faces, _ = cut_open(holes, np.concatenate([p.vertices, p.normals, p.uv], axis=1), p.faces)
@@ -161,7 +146,7 @@ def taken_apart(object_class: str, parts: tuple[MeshPart, ...]) -> TakenApart | 
     within, meshes = list(_where(parts, labels, WITHIN)), {}
     for k, (m, holds) in enumerate(zip(moving, held, strict=True)):
         empty = not (holds & ((s.high - s.low) > 0.5 * np.ptp(m.inside, axis=0))[:, :2].all(1)).any()
-        liner, own = _furnished(m, object_class, finish, empty) if m.cut else ([], ())
+        liner, own = _furnished(m, row, finish, empty) if m.cut else ([], [])
         within += liner
         meshes[m.name] = (*_where(parts, labels, k), *own)
     return TakenApart(parts, tuple(moving), labels, holes, tuple(fixed), tuple(within), meshes)
@@ -249,7 +234,7 @@ def _within(s: _Pieces, corners: np.ndarray, by: float = 1e-4) -> np.ndarray:
     return (s.low > corners[0] - by).all(1) & (s.high < corners[1] + by).all(1)
 
 
-def _fronts(s: _Pieces, object_class: str) -> list[MovingPart]:
+def _fronts(s: _Pieces, row: Row) -> list[MovingPart]:
     low, high, size = s.low, s.high, s.high - s.low
     whole = np.array([low.min(0), high.max(0)])
     depth = whole[1, 1] - whole[0, 1]
@@ -284,11 +269,11 @@ def _fronts(s: _Pieces, object_class: str) -> list[MovingPart]:
         own = _within(s, np.array([[a[0], -np.inf, a[2]], b]), ROUND_ABOUT) & ~others
         own[seed] = True
         grips = _grips(s, np.flatnonzero(own & (low[:, 1] < a[1] - GRIP)), a[1])
-        is_round = object_class in ROUND and not out and abs(size[seed, 0] / size[seed, 2] - 1) < 0.1
-        if is_round or (object_class not in ROUND and 1 <= len(grips) <= 2):
+        is_round = not out and abs(size[seed, 0] / size[seed, 2] - 1) < 0.1
+        if is_round if row.get("kind") == "round" else 1 <= len(grips) <= 2:
             handle = np.array([np.min(grips[:2], (0, 1)), np.max(grips[:2], (0, 1))]) if grips else np.array([a, b])
-            m = _hung(np.array([a, b]), handle, whole, object_class, np.flatnonzero(own), not drawer[seed])
-            out += [m] if object_class not in ONLY_DOORS or m.kind != "drawer" else []
+            m = _hung(np.array([a, b]), handle, whole, row, np.flatnonzero(own), not drawer[seed])
+            out += [m] if m.kind != "drawer" or "only_doors" not in row else []
     return out
 
 
@@ -299,10 +284,11 @@ def _belongs(s: _Pieces, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     out = ((low > a - ROUND_ABOUT) & (high < b + ROUND_ABOUT)).all(1)
     out |= ((low < a + TOUCH) & (high > b - TOUCH)).all(1) & ((high - low).prod(1) < 2.5 * (b - a).prod())
     for i, k in ((0, 1), (1, 0)):
-        meets = np.minimum(high[:, i], b[i]) - np.maximum(low[:, i], a[i])
+        beside = (high[:, i] < a[i] + LAP) & (high[:, i] > a[i] - TOUCH)
+        beside |= (low[:, i] > b[i] - LAP) & (low[:, i] < b[i] + TOUCH)
         along = (low[:, k] < a[k] + LAP) & (low[:, k] > a[k] - BOARD)
         along &= (high[:, k] > b[k] - LAP) & (high[:, k] < b[k] + BOARD)
-        out |= along & (meets > -TOUCH) & (meets < LAP) & (high[:, i] - low[:, i] < BOARD)
+        out |= along & beside & (high[:, i] - low[:, i] < BOARD)
     return out
 
 
@@ -319,16 +305,16 @@ def _grips(s: _Pieces, pieces: np.ndarray, face: float) -> list[Corners]:
 
 
 def _hung(
-    front: np.ndarray, handle: np.ndarray, whole: np.ndarray, object_class: str, pieces: np.ndarray, cut: bool
+    front: np.ndarray, handle: np.ndarray, whole: np.ndarray, row: Row, pieces: np.ndarray, cut: bool
 ) -> MovingPart:
     """The moving part that a front with its handle is; its name is its kind."""
     (x0, face, z0), (x1, back, z1) = front
-    w, h, is_round = x1 - x0, z1 - z0, object_class in ROUND
+    w, h, is_round = x1 - x0, z1 - z0, row.get("kind") == "round"
     off = (handle[:, 0].mean() - (x0 + x1) / 2) / w or 0.3 * is_round
     rim, deep = (0.2 * w, 0.1) if is_round else (RIM, BACK)
-    ceiling = max(z1 - rim - (BASIN if object_class in BASINS else 0.0), z0 + 0.05)
+    ceiling = max(z1 - rim - row.get("basin", 0.0), z0 + 0.05)
     inside = np.array([[x0 + rim, back, z0 + rim], [x1 - rim, whole[1, 1] - deep, ceiling]])
-    if object_class in FLAPS and abs(off) < OFF_CENTRE and h > 0.2:
+    if row.get("kind") == "flap" and abs(off) < OFF_CENTRE and h > 0.2:
         kind, axis, origin = "flap", [1.0, 0, 0], [(x0 + x1) / 2, face, z0]
     elif abs(off) >= OFF_CENTRE or is_round or h > max(0.5, 1.6 * w):
         kind, axis, origin = "door", [0, 0, -np.sign(off)], [x0 if off > 0 else x1, face, (z0 + z1) / 2]
@@ -421,64 +407,53 @@ def _halves(polygon: np.ndarray, way: np.ndarray, far: float) -> Corners:
     return np.array(apart), np.array(rest)
 
 
-def _furnished(
-    m: MovingPart, object_class: str, finish: Finish, empty: bool
-) -> tuple[list[MeshPart], tuple[MeshPart, ...]]:
+def _furnished(m: MovingPart, row: Row, finish: Finish, empty: bool) -> tuple[list[MeshPart], list[MeshPart]]:
     """The inside that a part closes, with shelves where it is empty, and what the part takes along."""
     (x0, y0, z0), (x1, y1, z1) = m.inside
-    skin = DARK if object_class in FLAPS else WHITE if object_class in ("fridge", "microwave") else finish
-    if object_class in ROUND:
+    skin = PLAIN[row["skin"]] if "skin" in row else finish
+    if row.get("kind") == "round":
         r, deep = (x1 - x0) / 2, y0 - y1
         drum = lathe([(0, deep), (r + RIM, deep), (r + RIM, 0), (r, 0), (r, deep + 0.01), (0, deep + 0.01)], 24)
-        return [part(STEEL, drum.hung((x0 + x1) / 2, y0, (z0 + z1) / 2))], ()
+        return [part(skin, drum.hung((x0 + x1) / 2, y0, (z0 + z1) / 2))], []
     (a, _, c), (b, _, d) = m.box
     walls = [((a, c), (x0, d)), ((x1, c), (b, d)), ((x0, c), (x1, z0)), ((x0, z1), (x1, d))]
     boxes = [box([p[0], y0, p[1]], [q[0], y1, q[1]]) for p, q in walls]
     inside = [part(skin, *boxes, box([a, y1, c], [b, y1 + 0.01, d]))]
-    boards = [box(p, q, 0.001) for p, q in boards_of(m, object_class)]
-    stored = _stored(m, object_class, boards) if empty else []
+    boards = boards_of(m)
+    built = [part(skin, *(box(p, q, 0.001) for p, q in boards))] if boards and empty else []
     if m.kind == "drawer":
-        return inside, (part(skin, *boards), *stored)
-    inside += stored
-    if object_class in FLAPS:
-        rows = [(y, z) for y in np.linspace(y0 + 0.03, y1 - 0.02, 9) for z in z0 + (z1 - z0) * np.array([0.3, 0.65])]
-        inside.append(part(STEEL, *(tube([(x0, y, z), (x1, y, z)], 0.003, 5) for y, z in rows)))
-    elif empty and boards:
-        inside.append(part(skin, *boards))
-        if object_class == "wardrobe" and z1 - z0 > 1.2:
-            y, z = (y0 + y1) / 2, z1 - 0.36
-            inside.append(part(STEEL, tube([(x0, y, z), (x1, y, z)], 0.012, 10)))
-    return inside, ()
+        return inside, [*built, *_stored(m, row, [z0 + 0.011, z1])]
+    if m.kind == "flap":
+        wires = [(y, z) for y in np.linspace(y0 + 0.03, y1 - 0.02, 9) for z in z0 + (z1 - z0) * np.array([0.3, 0.65])]
+        inside.append(part(PLAIN["steel"], *(tube([(x0, y, z), (x1, y, z)], 0.003, 5) for y, z in wires)))
+    stored = _stored(m, row, [z0, *(float(high[2]) for _, high in boards), z1]) if empty else []
+    return [*inside, *built, *stored], []
 
 
-def _stored(m: MovingPart, object_class: str, boards: Sequence[Shape]) -> list[MeshPart]:
-    """Folded clothes, crockery or food, on the ground and on the boards; the same in the same thing."""
-    kinds = {"fridge": 2} | dict.fromkeys(KITCHEN, 1) | dict.fromkeys(CLOSETS, 0)
-    if (kind := kinds.get(object_class)) is None:
+def _stored(m: MovingPart, row: Row, floors: Sequence[float]) -> list[MeshPart]:
+    """Folded clothes, crockery or food that lie on floors, of which the last is the ceiling; the same in the same
+    thing."""
+    if "holds" not in row:
         return []
-    (x0, y0, z0), (x1, y1, z1) = m.inside
-    drawer = m.kind == "drawer"
-    floors = [z0 + 0.011] if drawer else sorted([z0, *(float(b.vertices[:, 2].max()) for b in boards)])
+    (x0, y0, _), (x1, y1, _) = m.inside
     bowl = [(0, 0), (0.06, 0), (0.105, 0.03), (0.1, 0.03), (0.055, 0.008), (0, 0.008)]
-    shapes = [
-        [box([-0.085, -0.11, 0.032 * k], [0.085, 0.11, 0.032 * k + 0.03], 0.012) for k in range(4)],
-        [lathe(bowl, 16).moved(z=0.012 * k) for k in range(5)],
-        [cylinder(0.034, 0, 0.2, 0.012), box([-0.035, -0.035, 0], [0.035, 0.035, 0.18], 0.003)],
-    ][kind]
-    things: dict[int, list[Shape]] = {}
-    for row, (low, high) in enumerate(itertools.pairwise([*floors, z1])):
-        spots = np.linspace(x0, x1, max(1, int((x1 - x0) / (0.1 if kind == 2 else 0.24))) + 1)
-        for k, x in enumerate((spots[1:] + spots[:-1]) / 2):
-            chosen = (7 * k + 5 * row + int(1e3 * x1)) % 5
+    wide, shapes = {
+        "cloth": (0.24, [box([-0.085, -0.11, 0.032 * k], [0.085, 0.11, 0.032 * k + 0.03], 0.012) for k in range(4)]),
+        "crockery": (0.24, [lathe(bowl, 16).moved(z=0.012 * k) for k in range(5)]),
+        "food": (0.1, [cylinder(0.034, 0, 0.2, 0.012)]),
+    }[row["holds"]]
+    things: dict[str, list[Shape]] = {}
+    for k, (low, high) in enumerate(itertools.pairwise(floors)):
+        spots = np.linspace(x0, x1, max(1, int((x1 - x0) / wide)) + 1)
+        for i, x in enumerate((spots[1:] + spots[:-1]) / 2):
+            chosen = (7 * i + 5 * k + int(1e3 * x1)) % 5
             fits = [s for s in shapes if s.vertices[:, 2].max() < high - low - 0.03]
-            some = fits[chosen % 2 : chosen % 2 + 1] if kind == 2 else fits[: chosen + (row == 0 and drawer)]
-            for layer, shape in enumerate(some):
-                tint = (chosen + (layer if kind == 0 else 0)) % len(TINTS)
-                things.setdefault(tint, []).append(shape.moved(float(x), (y0 + y1) / 2 - 0.04, low))
-    return [part(TINTS[tint], *made) for tint, made in things.items()]
+            at = (float(x), (y0 + y1) / 2 - 0.04, low)
+            things.setdefault(TINTS[chosen], []).extend(s.moved(*at) for s in fits[: max(chosen, len(floors) == 2)])
+    return [part(PLAIN[tint], *made) for tint, made in things.items() if made]
 
 
-def boards_of(m: MovingPart, object_class: str) -> list[Corners]:
+def boards_of(m: MovingPart) -> list[Corners]:
     """Corners of a drawer's box, ground, sides and back, or of the shelves behind a door that has none."""
     (x0, y0, z0), (x1, y1, z1) = m.inside
     if m.kind == "drawer":
@@ -487,7 +462,6 @@ def boards_of(m: MovingPart, object_class: str) -> list[Corners]:
         walls = [((x0, y0), (x0 + b, y1)), ((x1 - b, y0), (x1, y1)), ((x0, y1 - b), (x1, y1))]
         boards = [((*p, z0), (*q, top)) for p, q in walls] + [((x0, y0, z0), (x1, y1, z0 + 0.006))]
     else:
-        tall = object_class == "wardrobe" and z1 - z0 > 1.2
-        levels = [z0 + 0.3, z1 - 0.3] if tall else np.linspace(z0, z1, max(1, round((z1 - z0) / STEP)) + 1)[1:-1]
+        levels = np.linspace(z0, z1, max(1, round((z1 - z0) / STEP)) + 1)[1:-1]
         boards = [((x0, y0 + 0.03, z - 0.009), (x1, y1, z + 0.009)) for z in levels if m.kind == "door"]
     return [(np.array(p), np.array(q)) for p, q in boards]

@@ -171,7 +171,7 @@ def boxes_of(case: Case, density: float, solid: Sequence[CollisionBox]) -> Itera
             leaf[1, 1] = min(leaf[1, 1], leaf[0, 1] + THICK)
         yield body, _box(leaf), LEAF_DENSITY
         yield case.bodies[f"{m.name}_handle"], _box(m.handle), LEAF_DENSITY
-        boards = boards_of(m, case.placement.object_class) if m.cut else []
+        boards = boards_of(m) if m.cut else []
         if m.kind == "drawer":
             yield from ((body, _box(np.array(b)), LEAF_DENSITY) for b in boards)
         else:
