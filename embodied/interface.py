@@ -11,7 +11,6 @@ horizon. View k of the 36 views looks along turn k % 12 and tilt k // 12 - 1.
 
 from __future__ import annotations
 
-import dataclasses
 import enum
 import math
 from collections.abc import Mapping, Sequence
@@ -519,10 +518,6 @@ class Extras:
     def lines(self, turn: int) -> tuple[str, ...]:
         """It in words, for language models and people; directions as seen along `turn` (Observation.turn)."""
         return ()
-
-    def as_json(self) -> dict[str, Any]:
-        """It for agents that are asked over HTTP."""
-        return dataclasses.asdict(self)  # type: ignore[call-overload]  # a record
 
 
 @dataclass(frozen=True, slots=True)

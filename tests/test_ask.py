@@ -11,7 +11,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from hand_chat import ChatServer
 from hand_worlds import grid_world
 
 from embodied.agents.ask.config import AskerConfig, AskEvaluation
@@ -24,7 +23,7 @@ from embodied.assistants.ask import in_view
 from embodied.cli import main as start
 from embodied.envs.ask import AskSettings, Prices
 from embodied.evaluation import tables
-from embodied.evaluation.own_agents import acted, observed, read_seeds, submitted
+from embodied.evaluation.own_agents import read_seeds, submitted
 from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.sensors import SensorSuite
@@ -234,25 +233,6 @@ def test_the_environment_checker_has_nothing_to_say(make_env, tasks):
 
 
 # Judging others ---------------------------------------------------------------------------------
-
-
-def test_what_an_http_agent_is_sent_names_no_place_and_no_goal(tasks, make_env):
-    for t in tasks:
-        sent = json.dumps(observed(make_env().reset(t)))
-        assert "grid" not in sent and not [p for p in (*t.goal.fitting, *t.goal.similar) if p in sent]
-
-
-def test_an_http_agent_plays_and_nonsense_stops_it(tasks, make_env, world):
-    def follows(seen):
-        return 200, {}, json.dumps({"action": seen["advised"] or "ask route"}).encode()
-
-    with ChatServer(follows) as server:
-        episodes = play(make_env, submitted(server.url), tasks[:5], seed=0)
-    assert all(success(e, world.graph) == 1 for e in episodes)
-    o = make_env().reset(tasks[0])
-    assert acted(o, b'{"action": "go 0"}') == Move(0) and acted(o, b'{"action": "ask region"}') == Ask(Intention.REGION)
-    for bad in (b"<html>", b"[]", b'{"action": 7}', b'{"action": "go 99"}', b'{"action": "go -1"}', b"[" * 99_999, b""):
-        assert acted(o, bad) == Stop()
 
 
 def test_a_submitted_folder_is_judged_and_may_not_see_situations(tmp_path, tasks, make_env):

@@ -101,7 +101,7 @@ def simulator(dialect: str, graphs: Path, batch: int | None = None):
     sim.setNavGraphPath(str(graphs))
     if batch is not None:
         sim.setBatchSize(batch)
-    sim.init() if dialect == "v0.1" else sim.initialize()
+    sim.initialize()
     return sim
 
 
@@ -228,19 +228,19 @@ def test_hannas_tasks_start_where_their_paths_start_and_are_shortest(data_sets, 
 # VNLA --------------------------------------------------------------------------------------------
 
 
-def test_vnlas_trajectories_lead_to_their_goals_in_the_first_release(folders):
+def test_vnlas_trajectories_lead_to_their_goals(folders):
     root = folders / "vnla"
-    sim = simulator("v0.1", root / "data/connectivity")
+    sim = simulator("upstream", root / "data/connectivity", 1)
     n = 0
     for split in ("train", "val_seen", "val_unseen", "test_seen", "test_unseen"):
         for item in read(root / f"data/asknav/asknav_{split}.json"):
             assert len(item["trajectories"]) == len(item["paths"])
             for path, actions in zip(item["paths"], item["trajectories"], strict=True):
                 assert actions[-1] == [0, 0, 0], "the teacher stops"
-                sim.newEpisode(item["scan"], path[0], item["heading"], 0)
+                sim.newEpisode([item["scan"]], [path[0]], [item["heading"]], [0])
                 for action in actions:
-                    sim.makeAction(*action)
-                assert sim.getState().location.viewpointId == path[-1]
+                    sim.makeAction(*([x] for x in action))
+                assert sim.getState()[0].location.viewpointId == path[-1]
                 n += 1
     assert n > 20
 
@@ -340,20 +340,17 @@ def test_room_to_rooms_teacher_reaches_every_goal_in_the_simulator(folders):
     assert [s.location.viewpointId for s in sim.getState()] == [i["path"][-1] for i in items]
 
 
-@pytest.mark.parametrize(
-    ("dialect", "root"), [pytest.param("upstream", "duet/datasets/R2R", marks=needs_pieces), ("v0.1", "r2r")]
-)
-def test_later_agents_turn_around_at_their_one_viewpoint_of_matterport3d(dialect, root, folders):
+@pytest.mark.parametrize("root", [pytest.param("duet/datasets/R2R", marks=needs_pieces), "r2r"])
+def test_later_agents_turn_around_at_their_one_viewpoint_of_matterport3d(root, folders):
     home = folders / root / "connectivity"
     assert (home / "scans.txt").read_text().split()[-1] == "ZMojNkEp431"
-    sim, one = simulator(dialect, home), (lambda x: x) if dialect == "v0.1" else (lambda x: [x])
+    sim = simulator("upstream", home)
     for k in range(36):
         if k == 0:
-            sim.newEpisode(*map(one, ("ZMojNkEp431", "2f4d90acd4024c269fb0efe49a8ac540", 0, math.radians(-30))))
+            sim.newEpisode(["ZMojNkEp431"], ["2f4d90acd4024c269fb0efe49a8ac540"], [0], [math.radians(-30)])
         else:
-            sim.makeAction(*map(one, (0, 1.0, 1.0 if k % 12 == 0 else 0)))
-        state = sim.getState()
-        assert (state if dialect == "v0.1" else state[0]).viewIndex == k
+            sim.makeAction([0], [1.0], [1.0 if k % 12 == 0 else 0])
+        assert sim.getState()[0].viewIndex == k
 
 
 @needs_pieces

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from embodied.agents.common.session import descend
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
-from embodied.agents.iliad.learners import RequestBatch, adel, adel_loss, dagger, mixture, reinforce, reinforce_loss
+from embodied.agents.iliad.learners import RequestBatch, adel, adel_loss, dagger, reinforce, reinforce_loss
 from embodied.agents.iliad.protocol import ExecutionScores
 from embodied.agents.iliad.training import IliadProblem, episodes_to, success_rate, train
 from embodied.seeds import stream
@@ -152,25 +152,6 @@ def test_dagger_shows_the_best_action_in_states_that_the_student_came_to():
     assert student.table.weight.grad[0, 0] < 0, "what was shown becomes likelier"
 
 
-class Button2:
-    """P_omega that knows one button only."""
-
-    def draw(self, tasks, *, rng: np.random.Generator) -> list[int]:
-        return [2] * len(tasks)
-
-
-@pytest.mark.parametrize(("mixing", "least", "most"), [(1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.25, 0.2, 0.3)])
-def test_the_mixture_executes_the_marginal_as_often_as_lambda_says(mixing, least, most):
-    """Eq 3.14: the student here always presses 0, the marginal 2; what is described as it is, is learned as it is."""
-    student = flat([1 - 3e-9, 1e-9, 1e-9, 1e-9])
-    asked = RequestBatch([Wish(0)] * 1000, ["0"] * 1000, stream(0, "mixture"))
-    lesson = mixture(asked, Watcher(), Button2(), student, mixing)
-    lesson.loss.backward()
-    assert least <= sum(e == 2 for e in lesson.executions) / 1000 <= most
-    assert list(lesson.descriptions) == [str(e) for e in lesson.executions]
-    assert bool(student.table.weight.grad[2].any()) == (mixing > 0), "learned under what was said"
-
-
 def test_lambda_is_halved_every_l_updates_down_to_its_least():
     never, often = LearnerConfig(), LearnerConfig(anneal_every=100)
     assert {mixing_at(never, u) for u in (0, 99, 10_000)} == {0.5}
@@ -193,7 +174,7 @@ QUICK = LearnerConfig(iterations=60, batch=8, learning_rate=0.1, validate_every=
 BINARY = {"learner": "binary", "learning_rate": 1.0}
 
 
-@pytest.mark.parametrize("settings", [{}, {"learner": "mixture"}, {"learner": "dagger"}, BINARY])
+@pytest.mark.parametrize("settings", [{}, {"learner": "dagger"}, BINARY])
 def test_each_learner_learns_the_buttons(tmp_path, settings):
     config = LearnerConfig(**{**vars(QUICK), **settings})
     p = problem()

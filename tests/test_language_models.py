@@ -21,7 +21,7 @@ from embodied.agents.language_models.client import AnswerCache, Client, ServerSe
 from embodied.agents.language_models.completions import object_schema
 from embodied.agents.language_models.observations import oracle_names
 from embodied.agents.language_models.prompts import PromptBuilder, read_prompt
-from embodied.agents.language_models.routes import ModelJudge, followed_replies, listener_arrives, paraphrased
+from embodied.agents.language_models.routes import followed_replies, listener_arrives, paraphrased
 from embodied.agents.language_models.transport import MOST_BYTES, completions_url, proxy_of
 from embodied.assets.catalogue import load_catalogue
 from embodied.assistants.ask import AskAssistant
@@ -488,19 +488,6 @@ def test_the_listener_tells_how_often_told_ways_are_understood(seen):
     stopped = Step(Pose(0), Mode.MAIN, "", (0,), "none", (), (1,), Ask(), reply, Pose(0))
     episode = Episode(find_tasks(1)[0], (stopped,), "limit")
     assert followed_replies([episode], {"grid": seen}) == (0, 1)
-
-
-def test_a_judge_rates_in_stars_and_describes(seen, answers):
-    path = seen.graph.path(0, 20)
-    replies = iter(['{"stars": 4}', '{"stars": 9}', '{"description": "Walk to the living room."}', "<html>"])
-    with ChatServer(lambda r: said(next(replies))) as server:
-        judge = ModelJudge(client_of(server, answers))
-        assert judge.rate(seen, "go to the living room", path, 0.0) == 0.75
-        assert judge.rate(seen, "go to the kitchen", path, 0.0) is None
-        assert "living room" in server.requests[0]["messages"][1]["content"].split("Walk:")[1]
-        rng = np.random.default_rng(0)
-        assert judge.describe(seen, path, 0.0, rng=rng) == "Walk to the living room."
-        assert judge.describe(seen, path[::-1], 0.0, rng=rng) == "" and judge.usage.invalid == 2
 
 
 def test_the_gymnasium_wrapper_speaks_in_messages():

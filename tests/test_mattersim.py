@@ -52,8 +52,7 @@ def simulator(folder: Path, dialect: str = "upstream", *, batch: int = 1):
     sim.setDiscretizedViewingAngles(True)
     sim.setCameraResolution(640, 480)
     sim.setCameraVFOV(math.radians(60))
-    if dialect != "v0.1":
-        sim.setBatchSize(batch)
+    sim.setBatchSize(batch)
     return sim
 
 
@@ -78,7 +77,7 @@ def test_every_field_of_the_recorded_poses_is_as_the_simulator_gave_it(run, fold
             assert (state.location.ix, state.location.rel_heading) == (locations[0][0], 0.0)
 
 
-def test_states_are_alive_and_those_of_the_first_release_are_not(folder):
+def test_states_are_alive(folder):
     sim = simulator(folder)
     sim.initialize()
     state = sim.getState()[0]
@@ -86,17 +85,6 @@ def test_states_are_alive_and_those_of_the_first_release_are_not(folder):
     sim.newEpisode([SCANS[0]], ["v001"], [0], [0])
     sim.makeAction([0], [1], [0])
     assert (state.step, state.viewIndex) == (1, 13) and sim.getState()[0] is state
-
-    old = simulator(folder, "v0.1")
-    old.init()
-    old.newEpisode(SCANS[0], "v001", 0, 0)
-    before = old.getState()
-    old.makeAction(0, 1, 0)
-    assert (before.step, before.viewIndex, old.getState().viewIndex) == (0, 12, 13)
-    assert before.rgb is None and before.location.point == list(state.location[2:5])
-    assert [v.viewpointId for v in old.getState().navigableLocations] == [
-        v.viewpointId for v in state.navigableLocations
-    ]
 
 
 def test_the_errors_are_those_of_the_module(folder, tmp_path):
@@ -124,11 +112,6 @@ def test_the_errors_are_those_of_the_module(folder, tmp_path):
     (tmp_path / "scans.txt").write_text("gone\n")
     with pytest.raises(ValueError, match="gone_connectivity"):
         empty.initialize()
-    old = simulator(folder, "v0.1")
-    with pytest.raises(ValueError, match="Invalid action index"):
-        old.makeAction(0, 0, 0)
-    with pytest.raises(ValueError, match="elsewhere_connectivity"):
-        old.newEpisode("elsewhere", "v001", 0, 0)
 
 
 def test_settings_are_ignored_after_initialize_but_for_the_camera(folder):
@@ -147,7 +130,7 @@ def test_settings_are_ignored_after_initialize_but_for_the_camera(folder):
         sim.makeAction([0, 0], [0, 0], [0, 0])
 
 
-def box(folder: Path, scan: str, viewpoint: str, *, apart: bool = False) -> None:
+def box(folder: Path, scan: str, viewpoint: str) -> None:
     """A skybox around a viewpoint: each side of the world in a colour of its own, two metres away."""
     colours = {0: (0, 0, 255), 1: (0, 255, 0), 2: (255, 0, 0), 3: (0, 255, 255), 4: (255, 255, 255), 5: (0, 0, 0)}
     faces = np.stack([np.full((64, 64, 3), colours[k], np.uint8) for k in range(6)])
@@ -157,11 +140,8 @@ def box(folder: Path, scan: str, viewpoint: str, *, apart: bool = False) -> None
     home = folder / scan / "matterport_skybox_images"
     home.mkdir(parents=True)
     tiles = tiles_of(faces)
-    for k in range(6) if apart else ():
-        cv2.imwrite(str(home / f"{viewpoint}_skybox{k}_sami.jpg"), tiles[k])
-    if not apart:
-        cv2.imwrite(str(home / f"{viewpoint}_skybox_small.jpg"), np.concatenate(list(tiles), 1))
-        cv2.imwrite(str(home / f"{viewpoint}_skybox_depth_small.png"), np.concatenate(list(tiles_of(depth)), 1))
+    cv2.imwrite(str(home / f"{viewpoint}_skybox_small.jpg"), np.concatenate(list(tiles), 1))
+    cv2.imwrite(str(home / f"{viewpoint}_skybox_depth_small.png"), np.concatenate(list(tiles_of(depth)), 1))
 
 
 SIDES = {0: (0, 255, 0), 3: (0, 0, 255), 6: (0, 255, 255), 9: (255, 0, 0)}
@@ -188,16 +168,6 @@ def test_pictures_look_where_the_agent_looks(folder, tmp_path):
     sim.newEpisode([SCANS[0]], ["v002"], [0], [0])
     with pytest.raises(ValueError, match="v002_skybox_small"):
         _ = sim.getState()[0].rgb
-
-
-def test_the_first_release_reads_six_files(folder, tmp_path):
-    box(tmp_path / "v1" / "scans", SCANS[0], "v001", apart=True)
-    sim = simulator(folder, "v0.1")
-    sim.setRenderingEnabled(True)
-    sim.setDatasetPath(str(tmp_path))
-    for step, colour in SIDES.items():
-        sim.newEpisode(SCANS[0], "v001", step * math.pi / 6, 0)
-        assert np.abs(sim.getState().rgb[240, 320].astype(int) - colour).max() < 12
 
 
 SCRIPT = """
@@ -245,12 +215,3 @@ def test_values_that_the_module_takes_are_taken_and_others_refused(folder):
     assert sim.getState()[0].step == 0
     for index in ([0], (0,), range(1), np.array([0]), [np.int64(0)], [False]):
         sim.makeAction(index, [np.float32(1)], [True])
-
-
-def test_single_values_are_refused_with_the_name_of_the_dialect_that_takes_them(folder):
-    start = RECORD["graphs"][SCANS[0]]["ids"][0]
-    with pytest.raises(TypeError, match="takes lists, 'v0.1' takes single values"):
-        simulator(folder).newEpisode(SCANS[0], start, 0, 0)
-    old = simulator(folder, "v0.1")
-    old.newEpisode(SCANS[0], start, 0, 0.0)
-    old.makeAction(np.int64(0), 0, 1)

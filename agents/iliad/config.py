@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from embodied.agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, SHARE, require, require_word
 
-STUDENT_LEARNERS = ("adel", "mixture", "dagger", "binary", "continuous")
-"""ADEL (Algorithm 9), the mixture of Algorithm 5, DAgger, and REINFORCE with a reward of success or of nearness."""
+STUDENT_LEARNERS = ("adel", "dagger", "binary", "continuous")
+"""ADEL (Algorithm 9), DAgger, and REINFORCE with a reward of success or of nearness."""
 
 
 @dataclass(frozen=True)
@@ -15,8 +15,7 @@ class LearnerConfig:
     """The defaults are those of the dissertation for REGEX."""
 
     learner: str = "adel"
-    """Learning algorithm: adel (Algorithm 9), mixture (Algorithm 5), dagger, or REINFORCE with a binary or a continuous
-    reward."""
+    """Learning algorithm: adel (Algorithm 9), dagger, or REINFORCE with a binary or a continuous reward."""
     iterations: int = 30_000
     """Updates of the weights."""
     batch: int = 32
@@ -24,7 +23,7 @@ class LearnerConfig:
     learning_rate: float = 1e-3
     """Learning rate of Adam; REINFORCE uses a tenth of it, as in the dissertation."""
     mixing: float = 0.5
-    """Lambda: the weight of executions from the marginal (Algorithm 9), or their share (Eq 3.14)."""
+    """Lambda: the weight of executions from the marginal (Algorithm 9)."""
     anneal_every: int = 0
     """Halve lambda after every so many updates; 0: never (L of Table C.1)."""
     least_mixing: float = 0.1

@@ -1,4 +1,4 @@
-"""Algorithm 9 (ADEL), Algorithm 5, DAgger and REINFORCE: the loss of one batch each, over the protocol of a problem.
+"""Algorithm 9 (ADEL), DAgger and REINFORCE: the loss of one batch each, over the protocol of a problem.
 
 All three begin alike: the world gives tasks with requests, an agent carries them out. They differ in
 what they hear: a description, a demonstration, or a number.
@@ -102,21 +102,6 @@ def described_loss(tasks: Tasks, done: Executions, descriptions: Sequence[str | 
         some, executions = [tasks[i] for i in heard], [done[i] for i in heard]
         loss = loss - student.scores(some, [descriptions[i] or NOTHING for i in heard], executions).objective.sum()
     return loss
-
-
-def mixture(
-    asked: RequestBatch, teacher: DescribingTeacher, marginal: Marginal, student: Student, mixing: float
-) -> IliadLesson:
-    """Algorithm 5: the execution of each task comes from the mixture of Eq 3.14, and the student learns what was said.
-
-    With `mixing` 1 this is Algorithm 4, with 0 Algorithm 8 whose epochs are one batch long. What was said is learned
-    from once, as it comes, not gathered in a buffer (docs/sources.md, S176).
-    """
-    tasks, rng = asked.tasks, asked.rng
-    own, unlabeled = student.sample(tasks, asked.requests, rng=rng), marginal.draw(tasks, rng=rng)
-    done = [u if rng.random() < mixing else o for u, o in zip(unlabeled, own, strict=True)]
-    descriptions = teacher.describe(tasks, done, rng=rng)
-    return IliadLesson(described_loss(tasks, done, descriptions, student) / len(tasks), done, descriptions)
 
 
 def dagger(asked: RequestBatch, world: RequestWorld, student: Student) -> IliadLesson:

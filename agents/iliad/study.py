@@ -51,16 +51,6 @@ ILIAD_TABLES: Mapping[str, StudyTable] = {
         StudyRow("every 5000", {"annealed": 5000}),
         StudyRow("never"),
     ),
-    "algorithms": _table(
-        "The algorithms of the text (docs/sources.md, S176)",
-        StudyRow("Algorithm 4, executions of the marginal", {"learner": "mixture", "mixing": 1.0}),
-        StudyRow(
-            "Algorithm 5, mixture annealed to 0",
-            {"learner": "mixture", "mixing": 1.0, "annealed": 5000, "least_mixing": 0.0},
-        ),
-        StudyRow("Algorithm 8, own executions", {"learner": "mixture", "mixing": 0.0}),
-        StudyRow("Algorithm 9, ADEL"),
-    ),
     "figure 3.7": StudyTable(
         "Success over the course of training",
         tuple(dataclasses.replace(row, judge={"curve": True}) for row in LEARNING_ROWS),

@@ -12,7 +12,7 @@ import torch
 
 from embodied.agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate, tasks_of_update
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
-from embodied.agents.iliad.learners import IliadLesson, RequestBatch, adel, dagger, mixture, reinforce
+from embodied.agents.iliad.learners import IliadLesson, RequestBatch, adel, dagger, reinforce
 from embodied.agents.iliad.protocol import DescribingTeacher, Marginal, RequestWorld, Student, Tasks
 from embodied.identity import Identity
 from embodied.seeds import stream
@@ -128,8 +128,6 @@ class _Learner:
         p, c = self.problem, self.config
         if c.learner == "adel":
             return adel(asked, p.teacher, p.marginal, p.explorer, p.student, mixing)
-        if c.learner == "mixture":
-            return mixture(asked, p.teacher, p.marginal, p.student, mixing)
         if c.learner == "dagger":
             return dagger(asked, p.world, p.student)
         reward = p.world.success if c.learner == "binary" else p.world.reward

@@ -1,6 +1,6 @@
-"""Routes in words: a language model rates, describes and paraphrases them; a scripted listener follows them.
+"""Routes in words: a language model paraphrases them; a scripted listener follows them.
 
-The rater is BANDIT's, the describer ILIAD's teacher. `embodied llm paraphrase` paraphrases a split: of its routes only
+`embodied llm paraphrase` paraphrases a split: of its routes only
 those are kept whose words lead to the same place.
 """
 
@@ -12,20 +12,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from embodied.agents.language_models.client import Client
 from embodied.agents.language_models.completions import object_schema
-from embodied.agents.language_models.observations import SMALLEST_SIGHTING
 from embodied.agents.language_models.prompts import read_prompt
 from embodied.interface import STEP, Episode, Route, SeenPlace, Usage
-from embodied.language import PlainLanguage, follow
+from embodied.language import follow
 from embodied.language.people_language import ARRIVED
 from embodied.language.plain_language import heard_subgoal
 
-STARS = 5
-RATING = object_schema(stars={"type": "integer", "minimum": 1, "maximum": STARS})
-DESCRIPTION = object_schema(description={"type": "string", "maxLength": 800})
 PARAPHRASE = object_schema(instruction={"type": "string", "maxLength": 800})
 STYLES = (
     "a friend on the phone, chatty",
@@ -35,43 +29,6 @@ STYLES = (
     "a child",
     "a non-native speaker with simple words",
 )
-
-
-class ModelJudge:
-    """Rates and describes; counts what it asked in `usage`."""
-
-    def __init__(self, client: Client, prompts: Path | None = None) -> None:
-        """`prompts`: folder with a judge.md or describe.md of one's own."""
-        self._client, self.usage = client, Usage()
-        self._judge = read_prompt("judge", ("instruction", "walk"), prompts)
-        self._describe = read_prompt("describe", ("walk",), prompts)
-
-    def rate(self, world: SeenPlace, instruction: str, path: Sequence[int], yaw: float) -> float | None:
-        """How well a walk carries out an instruction, 0 to 1 in steps of a star; None where the answer is none.
-
-        Args:
-          path: nodes; `yaw` is the first direction, radians.
-        """
-        walk = walk_in_words(world, path, yaw)
-        answer = self._client.ask(self._judge.messages(instruction=instruction, walk=walk), RATING)
-        self.usage += self._client.usage(answer)
-        return None if answer.value is None else (int(answer.value["stars"]) - 1) / (STARS - 1)
-
-    def describe(self, world: SeenPlace, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
-        """One description of a walk, as embodied.language.RouteDescriber gives; '' where the answer is none."""
-        answer = self._client.ask(self._describe.messages(walk=walk_in_words(world, path, yaw)), DESCRIPTION)
-        self.usage += self._client.usage(answer)
-        return "" if answer.value is None else str(answer.value["description"])
-
-
-def walk_in_words(world: SeenPlace, path: Sequence[int], yaw: float) -> str:
-    """A walk in plain words: turns, rooms, and the things at its end."""
-    plain = PlainLanguage().route(world, path, yaw, rng=np.random.default_rng(0))
-    kind = world.house.room_by_id[world.graph.room_of_node[path[0]]].kind.replace("_", " ")
-    in_sight = [s for s in world.sightings(path[-1]) if s.pixels >= SMALLEST_SIGHTING]
-    nearest = sorted((s.distance, s.object_class) for s in in_sight)[:2]
-    end = f" By the end there is {' and '.join(name for _, name in nearest)}." if nearest else ""
-    return f"It begins in the {kind}: {plain}{end}"
 
 
 @dataclass(frozen=True)

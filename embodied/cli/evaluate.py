@@ -106,8 +106,8 @@ class EvaluateOptions(TaskOptions, Results, OfTrained, WithModel, Encoded, Threa
     """The kind of task: find, vln, vnla, hanna, hari, ask, doors, or MODULE:NAME of your own."""
     agent: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
     """Agents to evaluate: baselines by name, 'shipped', a file or run folder of `embodied train`, 'llm', MODULE:CLASS
-    of your own policy, MODULE:LEARNER=RUN of your own learner, a folder with an agent.py, or the http:// address
-    of an agent (default: shipped, else all baselines)."""
+    of your own policy, MODULE:LEARNER=RUN of your own learner, or a folder with an agent.py
+    (default: shipped, else all baselines)."""
     threads: Count = 2
     sees: Annotated[str, Option(words=MODEL_SEES)] = "names"
     """Input of a language model: the true names of what is visible (an oracle), the candidate views as one strip,

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from embodied.action_spaces import Moves
 from embodied.assistants.ask import in_view
@@ -84,16 +82,6 @@ class AskExtras(Extras):
             advice = "stop here" if isinstance(self.advised, Stop) else f"go {self.advised.candidate}"
             parts.append(f"the route that you were told says: {advice}")
         return tuple(parts)
-
-    def as_json(self) -> dict[str, Any]:
-        go = self.advised
-        return {
-            "detections": [
-                {"bearing": round(d.bearing, 4), "distance": d.distance, "score": d.score} for d in self.detections
-            ],
-            "here": [dataclasses.asdict(f) for f in self.state_description],
-            "advised": "stop" if isinstance(go, Stop) else f"go {go.candidate}" if go else None,
-        }
 
 
 @dataclass(frozen=True)

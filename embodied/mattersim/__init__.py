@@ -1,11 +1,11 @@
 """A stand-in for the Matterport3D simulator that needs no build: programs written for `MatterSim` run on our houses.
 
-Anderson et al. 2018 published a simulator in C++ with a Python module `MatterSim`; Room-to-Room, VNLA, HANNA and
-ILIAD are written against it. This package answers as it does, from the files that `embodied export` writes:
+Anderson et al. 2018 published a simulator in C++ with a Python module `MatterSim`; Room-to-Room, HANNA and ILIAD are
+written against it (VNLA against its first release, which has another interface). This package answers as it does, from
+the files that `embodied export` writes:
 
   upstream   the public simulator (Room-to-Room): with discretized views an angle's sign turns by 30 degrees
   hanna      HANNA's and ILIAD's fork: with discretized views angles count steps of 30 degrees
-  v0.1       the first release (VNLA): one agent per simulator, `init`, `location.point`
 
     python -m embodied.mattersim hanna train.py -config configs/hanna.json ...
 
@@ -15,7 +15,7 @@ runs a script of theirs, unchanged, with the stand-in in the place of `MatterSim
     mattersim.install("upstream")
     import MatterSim
 
-It is a launcher and not a top-level module of the wheel, because the three dialects are three modules of one name,
+It is a launcher and not a top-level module of the wheel, because the dialects are modules of one name,
 and because an installed `MatterSim` would come before a real one that the programs append to their path.
 
 Differs from the C++ module in: an action index out of range moves nobody (there, the agents before it have moved);
@@ -30,14 +30,10 @@ from __future__ import annotations
 import sys
 import types
 
-from embodied.mattersim import simulator, v01
+from embodied.mattersim import simulator
 
-DIALECTS = {
-    "upstream": (simulator.Simulator, simulator.SimState, simulator.ViewPoint),
-    "hanna": (simulator.ForkSimulator, simulator.SimState, simulator.ViewPoint),
-    "v0.1": (v01.FirstSimulator, v01.FirstSimState, v01.FirstViewPoint),
-}
-"""Name of a dialect to its Simulator, SimState and ViewPoint."""
+DIALECTS = {"upstream": simulator.Simulator, "hanna": simulator.ForkSimulator}
+"""Name of a dialect to its Simulator."""
 
 
 def module(dialect: str) -> types.ModuleType:
@@ -49,7 +45,7 @@ def module(dialect: str) -> types.ModuleType:
     if dialect not in DIALECTS:
         raise ValueError(f"unknown dialect {dialect!r} of MatterSim; use one of {sorted(DIALECTS)}")
     made = types.ModuleType("MatterSim", f"The dialect {dialect!r} of embodied.mattersim.")
-    vars(made).update(zip(("Simulator", "SimState", "ViewPoint"), DIALECTS[dialect], strict=True))
+    vars(made).update(Simulator=DIALECTS[dialect], SimState=simulator.SimState, ViewPoint=simulator.ViewPoint)
     return made
 
 

@@ -36,8 +36,6 @@ TURNED_BACK = {1: cv2.ROTATE_90_CLOCKWISE, 2: cv2.ROTATE_180, 3: cv2.ROTATE_90_C
 DEPTH_UNITS = 4000.0
 """Depth along the ray is kept in quarters of a millimetre; 0 where nothing is."""
 RGB, DEPTH = "{}_skybox_small.jpg", "{}_skybox_depth_small.png"
-FACES = "{}_skybox{}_sami.jpg"
-"""The first release reads its tiles from six files."""
 
 
 def skybox_folder(dataset: str, scan: str) -> Path:
@@ -73,13 +71,12 @@ def write_face(face: int, tile: np.ndarray, to: np.ndarray) -> None:
 class Skyboxes:
     """The skyboxes of a folder, the last used of them in memory."""
 
-    def __init__(self, dataset: str, kept: int, *, apart: bool = False) -> None:
+    def __init__(self, dataset: str, kept: int) -> None:
         """Args:
         dataset: folder of `<scan>/matterport_skybox_images`.
         kept: how many to keep in memory.
-        apart: read the six files of the first release.
         """
-        self.dataset, self.apart = dataset, apart
+        self.dataset = dataset
         self.colours = functools.lru_cache(maxsize=max(1, kept))(self._colours)
         self.distances = functools.lru_cache(maxsize=max(1, kept))(self._distances)
 
@@ -90,15 +87,8 @@ class Skyboxes:
           ValueError: a picture is missing, or cannot be read.
         """
         folder = skybox_folder(self.dataset, scan)
-        if self.apart:
-            tiles = [_pixels(folder / FACES.format(viewpoint, k), _bgra) for k in range(6)]
-        else:
-            strip = _pixels(folder / RGB.format(viewpoint), _bgra)
-            tiles = [tile_of(strip, k) for k in range(6)]
-        side = len(tiles[0])
-        if {t.shape for t in tiles} != {(side, side, 4)}:
-            raise ValueError(f"MatterSim: the tiles of {viewpoint} in {folder} are not squares of one size")
-        return padded_rgba(side, lambda k, to: write_face(k, tiles[WHERE[k][0]], to))
+        strip = _pixels(folder / RGB.format(viewpoint), _bgra)
+        return padded_rgba(len(strip), lambda k, to: write_face(k, tile_of(strip, WHERE[k][0]), to))
 
     def _distances(self, scan: str, viewpoint: str) -> np.ndarray:
         """`padded_plane` of a skybox's depth along the ray, uint16 DEPTH_UNITS.

@@ -243,10 +243,7 @@ class Simulator:
     def _each(self, values: Any, convert: Callable[[Any], Any]) -> list[Any]:
         """A value per agent; more are ignored, as there."""
         if isinstance(values, (str, bytes)) or not isinstance(values, (Sequence, np.ndarray)):
-            raise TypeError(
-                f"MatterSim: expected a list, one value for each agent of the batch, got {values!r:.80}; this dialect "
-                "takes lists, 'v0.1' takes single values"
-            )
+            raise TypeError(f"MatterSim: expected a list, one value for each agent of the batch, got {values!r:.80}")
         if len(values) < self._batch:
             raise IndexError(f"MatterSim: {len(values)} values for {self._batch} agents")
         return [convert(v) for v in values[: self._batch]]

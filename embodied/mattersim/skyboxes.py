@@ -13,10 +13,12 @@ import cv2
 import numpy as np
 
 from embodied.assets.cache import write_bytes
-from embodied.mattersim.pictures import DEPTH, DEPTH_UNITS, FACES, RGB, tiles_of
+from embodied.mattersim.pictures import DEPTH, DEPTH_UNITS, RGB, tiles_of
 from embodied.render.panorama import Panorama, ray_stretch
 from embodied.render.panorama_file import PanoramaFile
 
+FACES = "{}_skybox{}_sami.jpg"
+"""The first release reads its tiles from six files."""
 QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
 """About 47 dB for our pictures."""
 PACKING = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP]
