@@ -2,7 +2,8 @@
 
 Generates a furnished house with people in it, lights it and renders the panorama of every viewpoint. Then one agent
 looks for an object along the shortest path, and a trained agent that has never seen this house finds another one by
-asking the people. Both episodes are recorded for Rerun; --video also films the second.
+asking the people. Both episodes are recorded for Rerun; --video also films the second. At last a door closes and opens,
+filmed as DIR/door.mp4.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from embodied.viz.recording import Recognise
     from embodied.world import World
 
+DOOR_FRAMES, DOOR_SIZE, DOOR_FROM = 36, (360, 480), (1.5, 4.0)
+"""Frames of the video of a door, their height and width in pixels, and metres from which the door is filmed."""
 SEED = 3
 """The demo house: a flat that is lit and drawn in a few minutes on two cores."""
 
@@ -82,6 +85,8 @@ def demonstrate(args: DemoOptions, viewers: tuple[str, ...]) -> None:
             walk = find_something(args, world, viewers)
         with timed("the second task: ask for help", seconds):
             help_facts = ask_for_help(args, world, routes, viewers)
+        with timed("a door closes and opens", seconds):
+            film_a_door(args.out / "door.mp4", world)
         facts: dict[str, object] = {"walk": walk, "help": help_facts, "plan": str(args.out / "plan.png")}
         facts |= {"seconds": seconds, "renderer": world.fingerprint["renderer"]}
     look = f"look at a recording with: embodied view {help_facts['recording']}"
@@ -179,6 +184,37 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route], viewe
         film(world, episode, args.video, args.video_size)
     recognise = Detector.load(encoder).recognise
     return recorded(world, episode, args.out / "help.rrd", viewers, eyes=world, recognise=recognise)
+
+
+def film_a_door(path: Path, world: World) -> None:
+    """Film how the door that is seen best from a viewpoint closes and opens again."""
+    import numpy as np
+
+    from embodied.cli.recording import VIDEO_ANGLE
+    from embodied.house.moment import Moment
+    from embodied.viz.video import write_video
+
+    best, pose = 0, None
+    for o in world.house.openings:
+        for node, eye in enumerate(world.graph.positions):
+            x, y = (np.add(o.a, o.b) / 2 - eye[:2]).tolist()
+            if o.kind == "door" and DOOR_FROM[0] < np.hypot(x, y) < DOOR_FROM[1]:
+                yaw = float(np.arctan2(y, x))
+                ids = world.panorama(node).view(yaw, -0.1, VIDEO_ANGLE, (60, 80))[2]
+                seen = int((ids == world.owners.index(f"{o.id}/leaf") + 1).sum())
+                best, pose = max((best, pose), (seen, (o.id, node, yaw)), key=lambda pair: pair[0])
+    if pose is None:
+        note("no viewpoint of this house sees a door")
+        return
+    door, node, yaw = pose
+
+    def frames() -> Iterator[np.ndarray]:
+        for openness in (1 + np.cos(np.linspace(0, 2 * np.pi, DOOR_FRAMES))) / 2:
+            world.show(Moment(openness={door: float(openness)}))
+            yield world.camera(world.graph.positions[node], yaw, -0.1, VIDEO_ANGLE, DOOR_SIZE).rgb
+
+    write_video(path, frames(), DOOR_SIZE)
+    world.show(Moment())
 
 
 def recorded(
