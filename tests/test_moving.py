@@ -17,7 +17,6 @@ from embodied.house.house import HouseError, Light, Sky
 from embodied.house.moment import Moment, RigidPose
 from embodied.interface import Pose
 from embodied.light import bake
-from embodied.light.tiles import filled
 from embodied.light.viewer import ViewerLight
 from embodied.navigation.graph import build_graph
 from embodied.render.classic import Renderer
@@ -76,15 +75,6 @@ def test_a_pose_turns_points_as_its_quaternion_says():
     pose = RigidPose((1.0, 2.0, 3.0), TURN)
     np.testing.assert_allclose(pose.points(np.eye(3))[0], [1 + math.cos(0.8), 2 + math.sin(0.8), 3.0])
     assert math.isclose(pose.yaw, 0.8)
-
-
-def test_what_is_unknown_in_a_picture_is_filled_from_around_and_what_is_known_stays():
-    picture = np.linspace(0, 1, 32, dtype=np.float32)[None, :, None] * np.ones((32, 1, 3), np.float32)
-    weight = np.ones((32, 32), np.float32)
-    weight[8:24, 8:24] = 0
-    out = filled(np.where(weight[..., None] > 0, picture, 9.0).astype(np.float32), weight)
-    np.testing.assert_array_equal(out[weight > 0], picture[weight > 0])
-    assert np.abs(out - picture).max() < 0.15
 
 
 @pytest.fixture(scope="module")

@@ -40,8 +40,6 @@ from embodied.scene.part import Part
 
 TRANSFER_RAYS = 48
 """Rays of a luxel that find where the thing hides the light from itself."""
-HIDING_RAYS = 32
-"""Rays of a place that find what a thing hid from it where it was baked."""
 DISCS = 48
 """Discs that stand for the whole of a thing's surface."""
 RAY_LIFT = 2e-3
@@ -219,7 +217,7 @@ def _transfer(s: Surface, face_normal: np.ndarray, face: np.ndarray) -> tuple[np
     for i in k:
         u = (turn + np.array(r2(i + 1.0))) % 1.0
         side = np.where(s.thin & (i % 2 == 1), -1.0, 1.0)[:, None]
-        ahead = _cosine_directions(s.normal * side, u)
+        ahead = cosine_directions(s.normal * side, u)
         out = face_normal * side
         rise = np.einsum("ij,ij->i", ahead, out)[:, None]
         ahead = np.where(rise < 0.01, ahead - out * (rise - 0.02), ahead).astype(np.float32)
@@ -245,7 +243,7 @@ def _summed(rows: np.ndarray, values: np.ndarray, n: int) -> np.ndarray:
     return np.stack([np.bincount(rows, v, n) for v in values.T], axis=1).astype(np.float32)
 
 
-def _cosine_directions(normal: np.ndarray, u: np.ndarray) -> np.ndarray:
+def cosine_directions(normal: np.ndarray, u: np.ndarray) -> np.ndarray:
     """(n, 3) directions around normals, as likely as their cosine, for numbers (n, 2) in [0, 1)."""
     z = 1 - 2 * u[:, 0]
     across, turn = np.sqrt(np.maximum(1 - z * z, 0)), 2 * np.pi * u[:, 1]
@@ -362,23 +360,6 @@ def _hiding(cloud: Cloud, position: np.ndarray, normal: np.ndarray) -> tuple[np.
     share *= (np.minimum(total, 1) / np.maximum(total, 1e-9))[:, None]
     mean = share @ at - share.sum(1)[:, None] * position
     return np.minimum(total, 1), mean, (share @ cloud.sent).astype(np.float32)
-
-
-def hidden_share(thing: Placed, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """(n,) share of what points could see that a thing hides, by their cosine, from rays: exact nearby, where discs are
-    coarse.
-
-    Args:
-      position, normal: (n, 3) float32, world.
-    """
-    turn = thing.pose.rotation.astype(np.float32)
-    local = (position + normal * RAY_LIFT - np.asarray(thing.pose.position, np.float32)) @ turn
-    met, around = np.zeros(len(position), np.float32), normal @ turn
-    start = np.stack(r2(np.arange(len(position)) * 7.0), axis=1)
-    for k in range(HIDING_RAYS):
-        ahead = _cosine_directions(around, (start + np.array(r2(k + 1.0))) % 1.0).astype(np.float32)
-        met += thing.surface.first_hit(local, ahead)[0] >= 0
-    return met / HIDING_RAYS
 
 
 def hidden_by(placed: Placed, start: np.ndarray, towards: np.ndarray, reach: np.ndarray | float = np.inf) -> np.ndarray:

@@ -22,6 +22,7 @@ from embodied.house.house import House
 from embodied.house.moment import WIDEST, Moment, RigidPose, apart
 from embodied.house.shapes import room_at
 from embodied.light.carried import Blocked, SentBack, by_carrier, direct, fitting_of, lamp_at, sent_back
+from embodied.light.gather import LitRays, behind, without
 from embodied.light.movers import (
     DISCS,
     Placed,
@@ -29,7 +30,6 @@ from embodied.light.movers import (
     SurfacePage,
     cloud_of,
     hidden_by,
-    hidden_share,
     hiding,
     kernels,
     shading,
@@ -44,10 +44,10 @@ from embodied.light.pages.tone import displayed, shown_table
 from embodied.light.pages.unwrap import areas_of
 from embodied.light.probes import CORNERS, harmonics, radiance, turned
 from embodied.light.settings import LightSettings
-from embodied.light.tiles import HALF_TILE, SAMPLES, TILE, Receiver, Tile, blocks_of, filled, luxels_in, read_receiver
+from embodied.light.tiles import HALF_TILE, SAMPLES, TILE, Receiver, Tile, blocks_of, luxels_in, read_receiver, sampled
 from embodied.light.tracing.emitters import GLAZING, Lamp, portals_of, read_lamps
 from embodied.light.tracing.rays import rays_among
-from embodied.light.tracing.sky import sun_direction, sun_height, sun_strength
+from embodied.light.tracing.sky import outdoors, sun_direction, sun_height, sun_strength
 from embodied.render.gloss import GlossData, Rays
 from embodied.scene.cupboards import lit_apart
 from embodied.scene.house_meshes import object_parts
@@ -59,8 +59,6 @@ FAINT = 0.025
 """Share of what a place sees, hidden by a thing, below which that is not shown."""
 SLIGHT, SLIGHT_MOVING = 0.01, 0.03
 """Change of the share of its light that a place gets which goes unnoticed, in a picture and in one of many."""
-NEARBY = 0.05
-"""Share hidden by the discs of a thing from which on rays are asked what it hid where it was baked."""
 BODIES, LAMPS = "*", "+"
 """Names of the groups of all that is no part of the house, and of all that changes the light of carried lamps."""
 DARKER = 1e-3
@@ -71,15 +69,14 @@ FEW_FROM, FEW_DISCS = 0.3, 12
 """Metres from a thing from which on so few discs stand for it."""
 SHADOW_REACH = 0.8
 """Metres from a thing up to which it is asked what light it hides."""
-UNKNOWN_BELOW, KNOWN_FROM = 0.5, 0.92
-"""Share of its light that a place gets past a thing, below which its baked light says nothing of it once the thing is
-gone, and above which it says all."""
 BRIGHT = (0.3, 2.0)
 """Bounds of how bright what a thing hides is, beside the rest: nine harmonics are no more sure of one direction."""
 INSIDE_NAME = "/"
 """End of the name of the inside of a thing that is open; before the name of a part of it stands the same."""
 BEFORE = 0.15
 """Metres before the front of a thing from which its inside has its light."""
+SKY_ROWS = 64
+"""Rows of the picture of the sky that rays meet."""
 AWAY = RigidPose((0.0, 0.0, -1e3))
 """Pose of a body that the moment does not have."""
 
@@ -201,6 +198,7 @@ class MovingHouse:
             self._things[name] = self._thing(name, moment)
         if new:
             self.__dict__.pop("_static", None)
+            self.__dict__.pop("_lit_rays", None)
             self.__dict__.pop("lit", None)
             self._shown, self._shown_things, self._drawn_at = {}, {}, {}
             self._take_out(new)
@@ -611,19 +609,7 @@ class MovingHouse:
             placed = self._lit_at({name: (thing.surface, thing.rest)})[name]
             low, high = placed.box
             for page, receiver, tiles in self._pages_near(low - SHADOW_REACH, high + SHADOW_REACH):
-                soft, _ = self._light(page)
-                known = np.ones(soft.shape[:2], np.float32)
-                for tile in tiles.tolist():
-                    at = luxels_in(tile)
-                    soft[at], known[at] = self._without(placed, receiver, soft[at], at)
-                    self._touched.add((page, tile[0], tile[1]))
-                for k in np.unique(receiver.mesh[(known < 1) & (receiver.mesh >= 0)]):
-                    own = receiver.mesh == k
-                    rows, columns = (slice(i.min(), i.max() + 1) for i in np.nonzero(own))
-                    part, sure = soft[rows, columns], (known * own)[rows, columns]
-                    around = filled(part, sure**4)
-                    sure, own = sure[..., None], own[rows, columns, None]
-                    soft[rows, columns] = np.where(own, sure * part + (1 - sure) * around, part)
+                self._give_light_back(placed, page, receiver, tiles)
             if len(self._portals):
                 self._give_sun_back(name, placed)
 
@@ -637,18 +623,51 @@ class MovingHouse:
             out |= {(page, int(i), int(k)) for i, k in {*zip(rows // TILE, columns // TILE)}}
         return out
 
-    def _without(
-        self, placed: Placed, r: Receiver, e: np.ndarray, at: tuple[slice, slice]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """(h, w, 3) light of a tile as it would be without a thing, and (h, w) how far that is known, 0 to 1."""
-        position, normal = r.position[at].reshape(-1, 3), r.normal[at].reshape(-1, 3)
-        share, towards, sent = hiding(cloud_of((placed,), DISCS), position, normal)
-        close = np.flatnonzero(share > NEARBY)
-        share[close] = hidden_share(placed, position[close], normal[close])
-        passed = _passed(share, towards, *self._in_the_open(position, normal))
-        without = np.maximum(e.reshape(-1, 3) - sent, 0) / np.maximum(passed, UNKNOWN_BELOW)
-        known = np.clip((passed - UNKNOWN_BELOW) / (KNOWN_FROM - UNKNOWN_BELOW), 0, 1)
-        return without.reshape(e.shape).astype(np.float32), known.reshape(e.shape[:2])
+    def _give_light_back(self, placed: Placed, page: int, r: Receiver, tiles: np.ndarray) -> None:
+        """Add to tiles of a page what they see now that a thing stands no longer before them."""
+        soft, at = self._light(page)[0], tuple(tiles.T)
+        position, normal, old = (a[at].reshape(-1, 3) for a in (r.samples, r.sample_normals, sampled(soft)))
+        cloud = cloud_of((placed,), DISCS)
+        which = np.flatnonzero(hiding(cloud, position, normal)[0] > FAINT / 2)
+        if not len(which):
+            return
+        some, out = position[which], normal[which]
+        whole, more, hid = behind(self._lit_rays, placed, cloud, some, out)
+        none = np.zeros(len(which), bool)
+        for lamp in self._lamps:
+            if lamp.room == self._room_of_page[page] and all(
+                lamp is not x for own in self._carried.values() for x in own
+            ):
+                free, past = (direct(lamp, some, out, none, self._blocked(t)) for t in ((), (placed,)))
+                whole, more = whole + free, more + free - past
+        gain = np.zeros((*r.samples.shape[:2], SAMPLES, 4), np.float32)
+        change = np.zeros((len(position), 4), np.float32)
+        change[:, 3] = 1
+        change[which, :3] = without(old[which], whole, more, hid) - old[which]
+        gain[at] = change.reshape(-1, SAMPLES, 4)
+        rows, columns = gain.shape[:2]
+        sheet = gain.reshape(rows, columns, HALF_TILE, HALF_TILE, 4).swapaxes(1, 2)
+        sheet = cv2.blur(np.ascontiguousarray(sheet.reshape(rows * HALF_TILE, columns * HALF_TILE, 4)), (3, 3))
+        sheet = sheet[..., :3] / np.maximum(sheet[..., 3:], 1e-3)
+        h, w = soft.shape[:2]
+        more = cv2.resize(sheet, (columns * TILE, rows * TILE), interpolation=cv2.INTER_LINEAR)[:h, :w]
+        np.maximum(soft + more, 0, out=soft)
+        self._touched |= {(page, i, k) for i, k in tiles.tolist()}
+
+    @functools.cached_property
+    def _lit_rays(self) -> LitRays:
+        """Rays among the house without what moved, as it was lit."""
+        meshes = [m for m, _ in self._still if m.page in self._room_of_page and m.alpha >= 0.9]
+        sent = {page: self._sent(page) for page in {m.page for m in meshes}}
+        return LitRays.among(self._static, meshes, sent, outdoors(self.house, SKY_ROWS).picture)
+
+    def _sent(self, page: int) -> np.ndarray:
+        """(h, w, 3) float32 radiance of the luxels of a page, without the glow of lamps."""
+        soft, sun = self._light(page)
+        h, w = soft.shape[:2]
+        small = lambda a: cv2.resize(a, (w, h), interpolation=cv2.INTER_AREA)
+        sunlight = small(sun)[..., None] * self._sun if sun.size else np.float32(0)
+        return small(LINEAR[self._receiver(page).held.albedo]) * (soft + sunlight)
 
     def _in_the_open(self, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(n,) light of places near each other in an empty room, and (n, 9) coefficients of what arrives there, both as

@@ -102,32 +102,12 @@ def read_receiver(bake: Bake, page: int) -> Receiver:
         tuple(m for m, _ in whole),
         low,
         high,
-        _sampled(shape(where)),
-        _sampled(shape(normal[shown_by])),
+        sampled(shape(where)),
+        sampled(shape(normal[shown_by])),
         shape(gain),
         held,
         fineness,
     )
-
-
-def filled(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """(h, w, 3) float32 of the pixels that weigh something, spread over those that do not.
-
-    Source: push and pull: S. Gortler and others, The lumigraph (1996), section 3.4.
-    """
-    both = np.dstack([picture * weight[..., None], weight]).astype(np.float32)
-    levels = [both]
-    while min(levels[-1].shape[:2]) > 1:
-        h, w = ((n + 1) // 2 for n in levels[-1].shape[:2])
-        small = cv2.resize(levels[-1], (w, h), interpolation=cv2.INTER_AREA)
-        weighs = small[..., 3:].copy()
-        levels.append(small * (np.minimum(weighs * 4, 1) / np.maximum(weighs, 1e-6)))
-    out = levels[-1]
-    for level in levels[-2::-1]:
-        larger = cv2.resize(out, level.shape[1::-1], interpolation=cv2.INTER_LINEAR)
-        larger /= np.maximum(larger[..., 3:], 1e-6)
-        out = level + (1 - np.minimum(level[..., 3:], 1)) * larger
-    return out[..., :3]
 
 
 def blocks_of(tiles: np.ndarray) -> list[np.ndarray]:
@@ -146,7 +126,7 @@ def luxels_in(tile: Sequence[int]) -> tuple[slice, slice]:
     return slice(tile[0] * TILE, (tile[0] + 1) * TILE), slice(tile[1] * TILE, (tile[1] + 1) * TILE)
 
 
-def _sampled(a: np.ndarray) -> np.ndarray:
+def sampled(a: np.ndarray) -> np.ndarray:
     """(rows, columns, SAMPLES, 3) means of two by two luxels of a page (h, w, 3), tile by tile."""
     h, w = a.shape[:2]
     rows, columns = -(-h // TILE), -(-w // TILE)
