@@ -18,6 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from embodied.assets.moving_parts import FIXED, TakenApart, boards_of, cut_open, openness_of
+from embodied.assets.records import MeshPart
 from embodied.house.house import House, Placement
 from embodied.house.moment import apart
 from embodied.scene import collision
@@ -123,12 +124,16 @@ def parts_of(case: Case, *, hidden: bool = False) -> Iterator[tuple[Part, Hung]]
     """The meshes of furniture in its own frame, closed, with the bodies that carry them.
 
     Args:
-      hidden: those alone that a closed thing does not show: its inside and drawers' boxes.
+      hidden: those alone that a closed thing does not show: its inside, drawers' boxes and the backs of fronts.
     """
     p, whole = case.placement, case.whole
     shown = {"": whole.within if hidden else (*whole.fixed, *whole.within)}
     for k, m in enumerate(whole.moving):
-        shown[m.name] = whole.parts[m.name][hidden * sum(bool((of == k).any()) for of in whole.labels) :]
+        seen = sum(bool((of == k).any()) for of in whole.labels)
+        backs = [dataclasses.replace(x, faces=x.faces[_looks_back(x)]) for x in whole.parts[m.name][:seen]]
+        shown[m.name] = (
+            (*(x for x in backs if len(x.faces)), *whole.parts[m.name][seen:]) if hidden else whole.parts[m.name]
+        )
     for name, meshes in shown.items():
         for k, mesh in enumerate(meshes):
             yield Part(p.id, "object", p.room, mesh, f"{p.asset}/{p.size}/{p.params}/{name}/{k}"), case.bodies[name]
@@ -154,7 +159,15 @@ def lit_parts(m: LitMesh, case: Case) -> Iterator[tuple[LitMesh, Hung]]:
     for k, part in enumerate(whole.moving):
         back, shift = part.turn(openness_of(p.params).get(part.name, 0.0))
         vertices = ((still.vertices - shift) @ back).astype(np.float32)
-        yield dataclasses.replace(still, vertices=vertices, faces=m.faces[label == k]), case.bodies[part.name]
+        closed = dataclasses.replace(still, vertices=vertices, faces=m.faces[label == k])
+        yield dataclasses.replace(closed, faces=closed.faces[~_looks_back(closed)]), case.bodies[part.name]
+
+
+def _looks_back(m: MeshPart | LitMesh) -> np.ndarray:
+    """(m,) bool: faces of a closed front that look into the thing, where it is dark."""
+    corners = m.vertices[m.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(normal[:, 1] > 0.5 * np.linalg.norm(normal, axis=1))
 
 
 def boxes_of(case: Case, density: float, solid: Sequence[CollisionBox]) -> Iterator[tuple[Hung, CollisionBox, float]]:

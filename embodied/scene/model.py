@@ -51,8 +51,8 @@ PIECES = 24
 PROBE_LIT = "lit_by_probes"
 """Material of a lit house for the bodies that are added to it: they shine in the colour of their light
 (embodied.light.viewer)."""
-INSIDE_DIM = 0.5
-"""Brightness of insides in a lit house, where no probes light them."""
+INSIDE_DIM = (0.4, 0.5, 0.6)
+"""Brightness of insides in a lit house, where no probes light them, of what looks along x, y and z."""
 OFFSCREEN = 1024
 """Side of the off-screen buffer: the largest picture, pixels."""
 LOOSE = ("floor", "against_wall", "corner", "surface")
@@ -452,10 +452,16 @@ def _add_insides(spec: mujoco.MjSpec, cases: Mapping[str, Case]) -> None:
     """Draw insides of closed furniture, which were not lit, in a plain colour, as bodies added to a lit house."""
     hidden = (x for case in cases.values() for x in cupboards.parts_of(case, hidden=True))
     for k, (part, carrier) in enumerate(hidden):
-        mesh, (r, g, b, alpha) = f"inside_{k}", part.mesh.finish.color
-        _add_mesh(spec, mesh, part.mesh.vertices, part.mesh.normals, part.mesh.uv, part.mesh.faces)
-        color = (INSIDE_DIM * r, INSIDE_DIM * g, INSIDE_DIM * b, alpha)
-        _draw(carrier.body, f"{part.owner}#inside{k}", mesh, PROBE_LIT, color, pos=carrier.origin)
+        mesh, finish = part.mesh, part.mesh.finish
+        color = (
+            load_texture(finish.texture)[..., :3].mean((0, 1)) / 255 if finish.texture else np.array(finish.color[:3])
+        )
+        corners = mesh.vertices[mesh.faces]
+        way = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])).argmax(1)
+        for axis in np.unique(way):
+            name, rgba = f"inside_{k}_{axis}", (*(INSIDE_DIM[axis] * color).tolist(), float(finish.color[3]))
+            _add_mesh(spec, name, mesh.vertices, mesh.normals, mesh.uv, mesh.faces[way == axis])
+            _draw(carrier.body, f"{part.owner}#{name}", name, PROBE_LIT, rgba, pos=carrier.origin)
 
 
 def _unturned(vertices: np.ndarray, yaw: float) -> np.ndarray:
