@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import warnings
 from pathlib import Path
@@ -23,6 +24,7 @@ from embodied.assistants.ask import in_view
 from embodied.cli import main as start
 from embodied.envs.ask import AskSettings, Prices
 from embodied.evaluation import tables
+from embodied.evaluation.asking import ask_counts, late_env
 from embodied.evaluation.own_agents import read_seeds, submitted
 from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv
@@ -32,7 +34,7 @@ from embodied.interface import Ask, Intention, Move, Pose, Stop
 from embodied.kinds.metrics import success
 from embodied.kinds.shipped.ask import ASK, ask_environments, price, success_progress, weighted_success
 from embodied.language.questions import intention_of
-from embodied.policies.ask import ASKER_RULES, Asker, EpisodeMemory
+from embodied.policies.ask import ASKER_RULES, COLLECT, Asker, CollectThenSplit, EpisodeMemory
 from embodied.records import from_json, to_json
 from embodied.tasks.ask import AMBIGUOUS, ask_pool, ask_tasks
 
@@ -221,6 +223,40 @@ def test_measures_by_hand(world, tasks, make_env):
     assert "weighted success (%)" in tables.markdown([row])
 
 
+def test_a_question_was_needed_if_it_rules_something_out(world, tasks, make_env):
+    vague = next(t for t in tasks if len(t.goal.fitting) > 1)
+    clear = next(t for t in tasks if len(t.goal.fitting) == 1)
+
+    def counts(task, *questions):
+        env = make_env()
+        env.reset(dataclasses.replace(task, start=at_target(task, world)))
+        for q in questions:
+            env.step(Ask(q))
+        env.step(Stop())
+        return dataclasses.astuple(ask_counts(env.episode(), world.graph))
+
+    assert counts(vague) == (0, 0, 1) and counts(vague, Intention.CONFIRM, Intention.REGION) == (2, 1, 0)
+    assert counts(vague, Intention.ROUTE) == (1, 1, 0), "a route that is told to its end says which it is"
+    assert counts(clear, Intention.ROUTE, Intention.CONFIRM) == (2, 0, 0)
+
+
+def test_nobody_can_be_asked_before_the_moment(tasks, make_env):
+    asks = Asker(ASKER_RULES["always route"])
+    for share in (0.1, 0.5, 1.0):
+        for e in play(functools.partial(late_env, make_env, share), asks, tasks[:6], seed=0):
+            times = [t for t, s in enumerate(e.steps) if s.reply]
+            assert all(t >= share * e.task.horizon for t in times) and (not times) == (share == 1 or len(e.steps) < 7)
+
+
+def test_who_collects_first_asks_only_what_splits_the_pool(world, tasks, make_env):
+    episodes = play(make_env, CollectThenSplit(), tasks, seed=0)
+    assert np.mean([success(e, world.graph) for e in episodes]) > 0.5
+    for e in episodes:
+        first = next((t for t, s in enumerate(e.steps) if s.reply), None)
+        assert first is None or first >= COLLECT * e.task.horizon
+        assert len([s for s in e.steps if s.reply and s.action.intention is not Intention.CONFIRM]) <= 1
+
+
 def test_the_environment_checker_has_nothing_to_say(make_env, tasks):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -283,8 +319,6 @@ def test_the_learned_asker_learns_a_rule_from_what_the_agent_knows(world, tasks,
         together = play(make_env, LearnedAsker(net), tasks, seed=0, batch=batch)
         assert [to_json(e) for e in together[:4]] == [to_json(e) for e in episodes]
     assert all(isinstance(e.steps[0].action, Ask) and e.steps[0].action.intention is Intention.ROUTE for e in episodes)
-    quiet = play(make_env, LearnedAsker(net, reserve=100.0), tasks[:4], seed=0)
-    assert not any(e.requests for e in quiet)
 
 
 def test_a_study_trains_by_dagger_judges_and_draws(world, tasks, make_env, tmp_path, monkeypatch):
@@ -301,9 +335,11 @@ def test_a_study_trains_by_dagger_judges_and_draws(world, tasks, make_env, tmp_p
     assert found["language model"]["success_unseen_houses"]["mean"] == 100
     assert found["never ask"]["price_unseen_houses"]["mean"] == 0
     made = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.safetensors")}
-    curve = ["learned asker, reserve 1", "learned asker, reserve 2", "never ask"]
-    run_study(study, ["curves"], tmp_path, rows=curve, note=quiet)
-    assert (tmp_path / "ask-curves.png").exists()
+    late = [f"always route, from {share} %" for share in (0, 50, 100)]
+    run_study(study, ["moments"], tmp_path, rows=[*late, "learned asker, from 100 %"], note=quiet)
+    found = {r["label"]: r["values"] for r in json.loads((tmp_path / "ask-moments.json").read_text())["rows"]}
+    by_moment = [found[name]["ask_F1_unseen_houses"]["mean"] for name in late]
+    assert by_moment[0] > by_moment[2] == 0 and (tmp_path / "ask-moments.png").exists()
     assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.safetensors")} == made and len(made) == 2
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -9,7 +10,21 @@ import pytest
 from hand_worlds import line_world
 
 from embodied.envs.base import HelpEnv
-from embodied.interface import FindObject, FollowRoute, Move, Pose, Stop, SuccessRule, Task, Trajectory
+from embodied.evaluation.asking import ask_counts
+from embodied.interface import (
+    Ask,
+    FindObject,
+    FollowRoute,
+    Intention,
+    Move,
+    Pose,
+    Reply,
+    Stop,
+    Subtask,
+    SuccessRule,
+    Task,
+    Trajectory,
+)
 from embodied.kinds import metrics
 
 
@@ -51,6 +66,46 @@ def test_stopping_one_node_short_is_success_only_within_the_radius():
 def test_passing_the_goal_is_oracle_success_only():
     graph, e = line_world().graph, walk([1, 2, 3, 2, 1], task(start=1))
     assert metrics.oracle_success(e, graph) == 1 and metrics.success(e, graph) == 0
+
+
+class Guide:
+    """Tells the next two nodes towards node 3, in words unless `mute`."""
+
+    def __init__(self, mute: bool) -> None:
+        self.mute = mute
+
+    def intentions(self, situation):
+        return (Intention.HELP,)
+
+    def answer(self, situation, question, *, rng):
+        way = situation.world.graph.path(situation.pose.node, 3)[:3]
+        return Reply(None if self.mute else "on", subtask=Subtask("way", way[-1], path=way))
+
+
+class Guided(HelpEnv):
+    def _replied(self, reply):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("nodes", "mute", "counts"),
+    [
+        ([0, "ask", 1, "ask", 2, 3], False, (2, 1, 0)),  # the second is on the way that was told
+        ([0, "ask", 1, "ask", 2, 3], True, (2, 2, 0)),
+        ([0, "ask", 1, 0, "ask", 1, 2], True, (2, 2, 1)),  # lost again, then on, then stopped short
+        ([0, "ask", "ask", 1, 2, 3], False, (2, 1, 0)),  # nothing came of the first
+        ([0, 1, 2, "ask", 1], True, (1, 0, 1)),
+        ([0, 1, 2, 3], True, (0, 0, 0)),  # no blocker: it found the way by itself
+        ([0, 1, 2, 3, "ask"], True, (1, 1, 0)),  # told that it is there, it stops
+    ],
+)
+def test_a_question_was_needed_where_the_answer_leads_on(nodes, mute, counts):
+    env = Guided({"line": line_world()}, Guide(mute))
+    env.reset(task())
+    for node in nodes[1:]:
+        env.step(Ask() if node == "ask" else Move(env.situation.candidate_nodes.index(node)))
+    env.step(Stop())
+    assert dataclasses.astuple(ask_counts(env.episode(), line_world().graph)) == counts
 
 
 def test_spl_measures_to_the_goal_nearest_the_final_node():

@@ -89,16 +89,14 @@ def fit(decisions: Decisions, config: AskerConfig) -> nn.Sequential:
 class LearnedAsker(PerEpisodePolicy):
     """Explores as the baselines do and decides by the network."""
 
-    def __init__(self, net: nn.Module, reserve: float = 0.0) -> None:
-        """`reserve`: taken off the logits of questions; more of it asks less."""
-        self._net, self._reserve = net, reserve
+    def __init__(self, net: nn.Module) -> None:
+        self._net = net
 
     @torch.inference_mode()
     def choose(self, o: Observation, trail: EpisodeMemory) -> Choice:
         """One of CHOICES that is possible."""
         logits = self._net(torch.from_numpy(facts(o, trail))[None])[0].numpy()
         worth = {c: float(logits[CHOICES.index(c)]) for c in possible(o, trail)}
-        worth = {c: v - self._reserve * (c in QUESTIONS) for c, v in worth.items()}
         return max(worth, key=lambda c: worth[c])
 
     def new_memory(self) -> Any:

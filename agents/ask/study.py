@@ -1,4 +1,4 @@
-"""Ask-v0's tables as data for the engine: all agents in houses never seen, and curves of success against price."""
+"""Ask-v0's tables as data for the engine: all agents in houses never seen, and success against the moment of asking."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import StoredPlace
 from embodied.envs.base import HelpEnv
+from embodied.evaluation.asking import late_env
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import measured
 from embodied.generate import HouseConfig
 from embodied.identity import Identity, identity_of
-from embodied.interface import Action, Agent, Ask, Detection, Intention, Observation, Task
+from embodied.interface import Agent, Task
 from embodied.kinds import metrics
 from embodied.kinds.shipped.ask import ASK, ask_environments
-from embodied.policies.ask import Asker, EpisodeMemory, PricedAskRule, between, first
 from embodied.records import save_lines
 from embodied.tasks.ask import ask_split, look_of
 
@@ -45,39 +45,24 @@ Places = Mapping[str, StoredPlace]
 ModelMaker = Callable[[Places], Agent]
 
 
-def after(steps: int) -> PricedAskRule:
-    """Asks for the way once so many steps have passed, and again when it has been walked; before, by thresholds."""
-    rule = between(0.55, 0.75)
-
-    def late(o: Observation, thing: Detection | None, trail: EpisodeMemory) -> Action | None:
-        return Ask(Intention.ROUTE) if o.extras.advised is None and o.time >= steps else rule(o, thing, trail)
-
-    return late
-
-
-LEVELS = ((0.75, 0.75), (0.7, 0.85), (0.6, 0.85), (0.5, 0.95), (0.4, 2.0))
-FAMILIES: Mapping[str, tuple[Callable[..., PricedAskRule], Sequence[tuple[float, ...]]]] = {
-    "thresholds on the score": (between, LEVELS),
-    "region, then thresholds": (lambda low, high: first(Intention.REGION, between(low, high)), LEVELS),
-    "route after some steps": (after, ((50,), (30,), (20,), (10,), (0,))),
-}
-"""Rules with numbers that say how readily they ask."""
-RESERVES = (2.0, 1.0)
+MOMENTS = (0.0, 0.1, 0.3, 0.5, 1.0)
+"""Shares of an episode's steps before which nobody can be asked."""
 
 
 def _rule(name: str) -> StudyRow:
     return StudyRow(name, None, {"rule": name})
 
 
-def _curves() -> tuple[StudyRow, ...]:
-    rows = [
-        StudyRow(f"{name} {' '.join(f'{x:g}' for x in level)}", None, {"rule": name, "level": level}, series=name)
-        for name, (_, levels) in FAMILIES.items()
-        for level in levels
+def _moments() -> tuple[StudyRow, ...]:
+    rules = ("confirm on sight", "region first", "appearance, then confirm", "collect, then split", "always route")
+    late = [
+        dataclasses.replace(
+            r, label=f"{r.label}, from {100 * m:g} %", judge={**r.judge, "late": m}, x=100 * m, series=r.label
+        )
+        for r in (*map(_rule, rules), StudyRow("learned asker", {}))
+        for m in MOMENTS
     ]
-    learned = [StudyRow(f"learned asker, reserve {r:g}", {}, {"reserve": r}, series="learned asker") for r in RESERVES]
-    learned.append(StudyRow("learned asker", {}, series="learned asker"))
-    return (*rows, *learned, *map(_rule, ("never ask", "confirm on sight", "always route", FORESIGHT, "oracle")))
+    return tuple(late)
 
 
 @dataclass(frozen=True)
@@ -105,16 +90,14 @@ class AskStudy(StudyLearner):
             for other in ("confirm on sight", "always route")
         )
         rows = (*map(_rule, ASK.baselines), StudyRow("learned asker", {}), _rule(FORESIGHT), *model, *differences)
-        figure = Figure(
-            ("success_",), "mean price of an episode's questions", "success (%)", against="price_unseen_houses"
-        )
+        figure = Figure(("success_",), "first question possible after so many per cent of the steps", "success (%)")
         return {
             "houses": StudyTable("Ask-v0 in unseen houses", rows, columns, ASK_SPLITS[:1]),
             "classes": StudyTable("Ask-v0 in unseen houses with unseen classes", rows, columns, ASK_SPLITS[1:]),
-            "curves": StudyTable(
-                "Ask-v0: success against price",
-                (*_curves(), *model),
-                ("success", "price"),
+            "moments": StudyTable(
+                "Ask-v0: success against the moment of the first question",
+                _moments(),
+                ("success", "weighted success", "requests", "question precision", "blockers cleared", "ask F1"),
                 ASK_SPLITS[:1],
                 figure=figure,
             ),
@@ -143,7 +126,8 @@ class AskStudy(StudyLearner):
         tasks: Sequence[Task] = ask_split(places, look, e.test_tasks, seed=TEST, unseen=split == ASK_SPLITS[1])
         tasks = spread(tasks, {MODEL: e.model_tasks, FORESIGHT: e.oracle_tasks}.get(str(rule)))
         player = self._player(weights, row.judge, places, make_env)
-        episodes = play(make_env, player, tasks, seed=TEST, batch=8, agent=row.label)
+        late = functools.partial(late_env, make_env, row.judge.get("late", 0.0))
+        episodes = play(late, player, tasks, seed=TEST, batch=8, agent=row.label)
         save_lines(keep.with_name(f"{keep.name}.jsonl"), episodes)
         return measured(episodes, {name: place.graph for name, place in places.items()})
 
@@ -151,10 +135,8 @@ class AskStudy(StudyLearner):
         self, weights: Path | None, judge: Mapping[str, Any], places: Places, make_env: Callable[[], HelpEnv]
     ) -> Agent:
         if weights is not None:
-            return LearnedAsker(load_asker(weights), judge.get("reserve", 0.0))
+            return LearnedAsker(load_asker(weights))
         rule = judge["rule"]
-        if rule in FAMILIES:
-            return Asker(FAMILIES[rule][0](*judge["level"]))
         if rule == MODEL:
             assert self.model is not None, "the row is there where a model is"
             return self.model(places)

@@ -23,7 +23,7 @@ class AskStudyOptions(StudyOptions, Repeated, WithModel, Cached):
     """Agents that decide when a question is worth its price (Ask-v0)."""
 
     tables: Tables
-    """Make these tables: houses, classes or curves."""
+    """Make these tables: houses, classes or moments."""
     config: Annotated[AskerConfig, Settings("the learned asker", AskerConfig())]
     evaluation: Annotated[AskEvaluation, Settings(EVALUATION, AskEvaluation())]
 

@@ -88,7 +88,7 @@ register_learner(
         players=players,
         columns=(
             *("success", "strict success", "spl", "navigation error", "requests"),
-            *("oracle success", "mistake repeat", "request repeat"),
+            *("ask F1", "oracle success", "mistake repeat", "request repeat"),
         ),
         shipped=SHIPPED_AGENT,
     )

@@ -102,7 +102,7 @@ register_learner(
         ),
         study=(HariStudyOptions, study),
         players=players,
-        columns=("success", "CUR", "GOAL", "SUB", "DO", "requests", "navigation error"),
+        columns=("success", "CUR", "GOAL", "SUB", "DO", "requests", "ask F1", "navigation error"),
         shipped=SHIPPED_HARI,
     )
 )

@@ -73,7 +73,7 @@ def study(args: VnlaStudyOptions) -> StudyLearner:
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """The learned asker beside other askers, direct intervention and agents without learning."""
     from embodied.agents.vision.training_data import evaluation_data
-    from embodied.agents.vnla.agent import WITHOUT_LEARNING, VnlaAgent
+    from embodied.agents.vnla.agent import BLIND, WITHOUT_LEARNING, VnlaAgent
 
     source, agent = evaluation_data(data, how), VnlaAgent.load(file)
 
@@ -83,7 +83,7 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
         bank, names = source.split(split).bank, agent.rows()
         under = functools.cache(lambda rules: data.split(split, rules=rules))
         rows = {name: (under(agent.rules_of_row(name)), agent.player(bank, name)) for name in names}
-        return Players(rows, WITHOUT_LEARNING, about)
+        return Players(rows, (BLIND, *WITHOUT_LEARNING), about)
 
     return of_split
 
@@ -96,7 +96,7 @@ register_learner(
         players=players,
         columns=(
             *("success", "strict success", "room success", "navigation error"),
-            *("requests", "oracle success", "steps"),
+            *("requests", "ask F1", "oracle success", "steps"),
         ),
         shipped=SHIPPED_VNLA,
     )

@@ -37,10 +37,7 @@ def draw(table: StudyTable, body: Mapping[str, Any], path: Path) -> None:
     axes = figure.subplots()
     of = {row["label"]: row["values"] for row in body["rows"]}
     placed = any(row.x is not None for row in table.rows)
-    for row in table.rows if spec.against else ():
-        for _, value in _wanted(of.get(row.label, {}), spec.columns):
-            curves.setdefault(row.series or row.label, []).append((of[row.label][spec.against]["mean"], value))
-    for row in table.rows if not spec.against else ():
+    for row in table.rows:
         for k, (key, value) in enumerate(_wanted(of.get(row.label, {}), spec.columns)):
             what = key.partition("_at_")[0].replace("_", " ")
             name = f"{row.series if row.x is not None else row.label} {what}".strip()

@@ -31,8 +31,6 @@ class Figure:
     columns: tuple[str, ...]
     xlabel: str
     ylabel: str
-    against: str = ""
-    """Key of the column over whose mean rows are drawn, instead of their `x`."""
     log: bool = False
     """True if x grows by factors."""
     share: bool = False

@@ -29,6 +29,8 @@ ASKED = {
 DIRECT = "learned, direct intervention"
 """The advisor carries out what it said: direct with sub-goals in the paper."""
 LEARNED = "learned"
+BLIND = "learned, blind"
+"""The same networks, which see black."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +72,7 @@ class VnlaAgent(SightedAgent):
     def rows(self) -> tuple[str, ...]:
         """All rows that it gives; direct intervention is that of one which learned to read what the advisor says."""
         direct = (DIRECT,) if self.config.rules == "indirect" else ()
-        return (LEARNED, *ASKED, *direct, *WITHOUT_LEARNING)
+        return (LEARNED, BLIND, *ASKED, *direct, *WITHOUT_LEARNING)
 
     def rules_of_row(self, row: str) -> str:
         """The rule of play that a row is judged under."""
@@ -80,7 +82,7 @@ class VnlaAgent(SightedAgent):
         """Who plays a row: shown the situations only where its asker needs them."""
         if row in WITHOUT_LEARNING:
             return VNLA.agent(row)
-        policy = self.policy(bank, None if row in (LEARNED, DIRECT) else ASKED[row])
+        policy = self.policy(bank.blind() if row == BLIND else bank, ASKED.get(row))
         shown = policy.asker in ("random", "teacher")
         return Supervised(policy, {"rules": rules_of(self.config)}) if shown else policy
 

@@ -64,6 +64,9 @@ class TaskOptions:
     """Random seed."""
     assistant: Annotated[str, Option(metavar="WHO")] = TEMPLATE
     """Who answers requests: template (the kind's own assistant), llm, person, or MODULE:CLASS of your own."""
+    ask_after: Annotated[float, Option(metavar="SHARE")] = 0.0
+    """Nobody can be asked before this share of an episode's steps, 0 to 1: success against the moment of the first
+    question."""
     batch: Count | None = None
     """Play N episodes at a time, which does not change results (default: 32 for trained agents, else 8)."""
     rules: Annotated[str | None, Option(metavar="WORD")] = None
@@ -140,8 +143,9 @@ class Evaluation:
     """Split and agent to how many of the routes that it was told a scripted listener arrives with, and how many."""
 
     def changed(self, split: SplitData) -> SplitData:
-        """The split with this assistant, these doors and episodes of at most --steps."""
+        """The split with this assistant, these doors, this moment of asking and episodes of at most --steps."""
         from embodied.envs.base import DoorRule
+        from embodied.evaluation.asking import late_env
         from embodied.tasks.doors import with_closed_doors
 
         if steps := self.args.steps:
@@ -158,8 +162,9 @@ class Evaluation:
                 env.assistant = self.reword(env.assistant)
             return env
 
-        usual = self.args.assistant == TEMPLATE and self.args.doors == DoorRule.OPEN.value
-        return split if usual else dataclasses.replace(split, make_env=make_env)
+        usual = self.args.assistant == TEMPLATE and self.args.doors == DoorRule.OPEN.value and not self.args.ask_after
+        late = functools.partial(late_env, make_env, self.args.ask_after)
+        return split if usual else dataclasses.replace(split, make_env=late)
 
     def keep(self, split: str, name: str, episodes: Sequence[Episode]) -> None:
         """Save episodes into --out."""
@@ -204,8 +209,10 @@ def parsed(args: EvaluateOptions) -> Evaluation:
     agents, trained = agents_of(args, kind)
     if trained and data is None:
         raise ValueError(f"trained agents need --data, a folder that `embodied dataset {args.kind}` built")
-    if args.assistant != TEMPLATE and kind.help == "none":
-        raise ValueError(f"nobody is asked in tasks of kind {kind.name!r}; leave --assistant out")
+    if (args.assistant != TEMPLATE or args.ask_after) and kind.help == "none":
+        raise ValueError(f"nobody is asked in tasks of kind {kind.name!r}; leave --assistant and --ask-after out")
+    if not 0 <= args.ask_after <= 1:
+        raise ValueError(f"--ask-after should be a share of the steps, 0 to 1, got {args.ask_after:g}")
     splits = args.split or kind.test_splits
     if data is not None:
         for split in splits:
@@ -413,6 +420,7 @@ def write(evaluation: Evaluation) -> None:
             "rules": args.rules,
             "doors": [args.closed_doors, args.doors],
             "assistant": args.assistant,
+            "ask_after": args.ask_after,
         }
         tables.save(rows, args.out, "table")
         write_json(args.out / "run.json", fingerprint(**{**about, **evaluation.facts}), indent=1)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from embodied.assets.cache import write_bytes
+from embodied.evaluation.asking import AskCounts, ask_counts
 from embodied.interface import Episode
 from embodied.kinds import metrics
 from embodied.kinds.task_kind import kind_named, known_kinds
@@ -34,6 +35,9 @@ PERCENT = (
     "right place first",
     "precision",
     "recall",
+    "question precision",
+    "blockers cleared",
+    "ask F1",
 )
 """Columns of all kinds and of learners shown in per cent; those of one kind of task say so (Metric)."""
 SHARES = ("success", "strict success", "oracle success")
@@ -185,6 +189,8 @@ def measured(episodes: Sequence[Episode], graphs: Mapping[str, NavGraph]) -> dic
     samples = {name: Samples(of(f), houses, share=name in SHARES) for name, f in metrics.PER_EPISODE.items()}
     for name, metric in kind.metrics.items():
         samples[name] = Samples(of(metric.of), houses, of(metric.per) if metric.per else (), metric.share)
+    if kind.help != "none":
+        samples |= _asking([*of(ask_counts)], houses)
     used = [metrics.usage(e) for e in episodes]
     if any(used):
         for name, count in metrics.USAGE.items():
@@ -196,6 +202,17 @@ def measured(episodes: Sequence[Episode], graphs: Mapping[str, NavGraph]) -> dic
         again, total = zip(*of(f), strict=True)
         samples[name] = Samples(tuple(map(float, again)), houses, tuple(map(float, total)))
     return samples
+
+
+def _asking(counts: Sequence[AskCounts], houses: tuple[str, ...]) -> dict[str, Samples]:
+    """The measures of `ask_counts`."""
+    ratio = lambda some, all_: Samples(tuple(map(float, some)), houses, tuple(map(float, all_)))
+    needed, blockers = [c.needed for c in counts], [c.needed + c.left for c in counts]
+    return {
+        "question precision": ratio(needed, (c.questions for c in counts)),
+        "blockers cleared": ratio(needed, blockers),
+        "ask F1": ratio((2 * n for n in needed), (c.questions + b for c, b in zip(counts, blockers, strict=True))),
+    }
 
 
 def row(agent: str, split: str, episodes: Sequence[Episode], graphs: Mapping[str, NavGraph], *, seed: int) -> Row:

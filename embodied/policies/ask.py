@@ -14,7 +14,7 @@ import numpy as np
 
 from embodied.geometry import wrap
 from embodied.interface import Action, Ask, Detection, Intention, Move, Observation, Situation, Stop
-from embodied.policies.baselines import PerEpisodePolicy
+from embodied.policies.baselines import PerEpisodePolicy, step_on_known_way
 
 REACH = 2.0
 """Metres within which a thing has been reached."""
@@ -138,3 +138,59 @@ ASKER_RULES: Mapping[str, PricedAskRule] = {
     "appearance, then confirm": first(Intention.APPEARANCE, between(0.5, 0.95)),
     "always route": lambda o, thing, trail: None if o.extras.advised else Ask(Intention.ROUTE),
 }
+
+
+# Collecting first -------------------------------------------------------------------------------
+
+COLLECT = 0.4
+"""Share of the steps in which it collects."""
+
+
+@dataclass
+class PoolMemory(EpisodeMemory):
+    """Memory of one episode, with what was found on the way."""
+
+    ways: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    """Neighbours of the places where it has been."""
+    pool: dict[int, str] = field(default_factory=dict)
+    """Kind of the room of each place where it reached what may be the thing."""
+
+
+class CollectThenSplit(Asker):
+    """Collects what may be it, then asks what splits the pool, and goes back to what is left.
+
+    The rule of ProCompNav (Kwon et al. 2026, arXiv 2605.06223) with Ask-v0's questions. Theirs finds attributes that
+    split the pool and asks yes or no; here it asks for the region where rooms differ, else for the appearance, and at
+    a thing whether this is it, unless it is the last.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(confirm_on_sight)
+
+    def new_memory(self) -> Any:
+        return PoolMemory()
+
+    def act_one(self, o: Observation, s: Situation, memory: Any, rng: np.random.Generator) -> Action:
+        here, thing, pool = s.pose.node, reached(o), memory.pool
+        memory.ways[here] = s.candidate_nodes
+        likely = thing is not None and thing.score >= LIKELY
+        if o.time < COLLECT * s.task.horizon:
+            if likely and not pool.keys() & {here, *s.candidate_nodes}:
+                pool[here] = next((f.name for f in o.extras.state_description if f.kind == "room"), "")
+            memory.visits[here] = memory.visits.get(here, 0) + 1
+            return onward(o, s, memory, rng)
+        question = Intention.REGION if len({*pool.values()}) > 1 else Intention.APPEARANCE
+        if len(pool) > 1 and question in o.can_ask and not memory.asked:
+            return memory.ask(question, thing)
+        if Intention.REGION in memory.asked:
+            heard_room = o.instruction.split(" . ")[1].replace(" ", "_")
+            memory.pool = pool = {v: room for v, room in pool.items() if room in heard_room}
+        if thing is not None and here in pool:
+            confirmed = memory.asked_at.get(Intention.CONFIRM) == memory.moment
+            if likely and (len(pool) == 1 or (confirmed and thing.score >= memory.before)):
+                return Stop()
+            if likely and not confirmed and Intention.CONFIRM in o.can_ask:
+                return memory.ask(Intention.CONFIRM, thing)
+            del pool[here]
+        place = step_on_known_way(memory.ways, here, pool)
+        return super().act_one(o, s, memory, rng) if place is None else Move(s.candidate_nodes.index(place))

@@ -7,7 +7,7 @@ others see Observations only.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -269,6 +269,20 @@ class HalfwaySkyline(PerEpisodePolicy):
         if len(s.extras.goals) == 1 and s.pose.node != s.extras.goals[0] and Intention.SUB in o.can_ask:
             return Ask(Intention.SUB)
         return shortest_of(s)
+
+
+def step_on_known_way(ways: Mapping[int, tuple[int, ...]], here: int, goals: Container[int]) -> int | None:
+    """The next place on the way of fewest steps to one of `goals`, among the places of which neighbours are known; None
+    where they do not lead there, or one is there."""
+    first = {here: here}
+    for v in (line := [here]):
+        if v in goals:
+            return None if v == here else first[v]
+        for w in ways.get(v, ()):
+            if w not in first:
+                first[w] = w if v == here else first[v]
+                line.append(w)
+    return None
 
 
 def _random_move(o: Observation, rng: np.random.Generator) -> Action:

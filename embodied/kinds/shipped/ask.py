@@ -29,7 +29,7 @@ from embodied.kinds.task_kind import (
     register_kind,
 )
 from embodied.navigation.graph import NavGraph
-from embodied.policies.ask import ASKER_RULES, Asker
+from embodied.policies.ask import ASKER_RULES, Asker, CollectThenSplit
 from embodied.policies.baselines import Shortest
 from embodied.tasks.ask import Look, ask_pool, ask_tasks, look_of
 
@@ -133,7 +133,11 @@ ASK = register_kind(
         environment=environments,
         rules=AS_USUAL,
         help="words",
-        baselines={**{name: functools.partial(Asker, rule) for name, rule in ASKER_RULES.items()}, "oracle": Shortest},
+        baselines={
+            **{name: functools.partial(Asker, rule) for name, rule in ASKER_RULES.items()},
+            "collect, then split": CollectThenSplit,
+            "oracle": Shortest,
+        },
         metrics={
             "weighted success": Metric(weighted_success, percent=True),
             "success progress": Metric(success_progress, percent=True),
@@ -143,7 +147,7 @@ ASK = register_kind(
         },
         columns=(
             *("success", "spl", "weighted success", "success progress"),
-            *("price", "price per success", "requests"),
+            *("price", "price per success", "requests", "ask F1"),
         ),
         expert="oracle",
         splits=None,
