@@ -70,8 +70,6 @@ class Learner:
     `on_validation` is passed where the options have `rrd` set, and is called with update and episodes."""
     study: Commands | None = None
     """`embodied study NAME`: options, of agents.options.StudyOptions, and what makes a StudyLearner of them."""
-    show: Commands | None = None
-    """`embodied show NAME`: options with `json`, and show(options, note=) -> what is shown as JSON, and as text."""
     players: Callable[[Path, Dataset, PlaySettings], PlayersOfSplit] | None = None
     """(weights or run folder, data set, how it sees) -> split -> who plays."""
     columns: tuple[str, ...] = ()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 
 import pytest
 import torch
@@ -141,13 +140,3 @@ def test_commands_train_and_show(source, tmp_path, capsys):
     out = ["--out", str(tmp_path), "--iterations=2", "--batch=4"]
     assert main(["train", "iliad", "nav", *where, *out, *sizes]) == 0
     (best,) = tmp_path.rglob("best.safetensors")
-    capsys.readouterr()
-    world = ["--world", "nav", *where, "--shared", str(tmp_path / "shared")]
-    show = ["show", "iliad", str(best), *world, "--episodes", "1"]
-    assert main([*show, "--json"]) == 0
-    (told,) = json.loads(capsys.readouterr().out)["episodes"]
-    assert told["request"] and len(told["walked"]) >= 1
-    assert main(["show", "iliad", str(best), "--world", "nav"]) == 2
-    assert "--data" in capsys.readouterr().err
-    assert main(["show", "iliad", "--data", str(source.folder), "--request", "drop every vowel"]) == 2
-    assert "--world nav" in capsys.readouterr().err

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import re
 
 import pytest
@@ -392,10 +391,3 @@ def test_commands_train_and_show(tmp_path, capsys):
     sizes = [f"--{k.replace('_', '-')}={v}" for k, v in vars(SMALL).items() if k != "teacher"]
     assert main(["train", "iliad", "regex", "--out", str(tmp_path), "--iterations=2", "--batch=4", *sizes]) == 0
     (best,) = tmp_path.rglob("best.safetensors")
-    capsys.readouterr()
-    assert main(["show", "iliad", str(best), "--shared", str(tmp_path / "shared"), "--episodes", "1"]) == 0
-    assert "request" in capsys.readouterr().out
-    assert main(["show", "iliad", str(best), "--request", "drop every vowel", "--word", "tea", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["episodes"][0]["words"] == ["tea"]
-    assert main(["show", "iliad", str(best)]) == 2
-    assert "--shared" in capsys.readouterr().err

@@ -15,7 +15,7 @@ from hand_chat import ChatServer, Parrot, said
 from hand_worlds import HandWorld, grid_world
 from PIL import Image
 
-from embodied.agents.language_models.agent import LanguageModelAgent, Messages
+from embodied.agents.language_models.agent import LanguageModelAgent
 from embodied.agents.language_models.assistant import ModelAssistant, PersonAssistant, assistant_maker
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
 from embodied.agents.language_models.completions import object_schema
@@ -29,8 +29,6 @@ from embodied.envs.base import HelpEnv
 from embodied.errors import UnableError
 from embodied.evaluation import tables
 from embodied.evaluation.rollout import play
-from embodied.gym.env import HelpGymEnv
-from embodied.gym.sensors import SensorSuite
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Reply, Route, Sighting, Step, Subtask, Usage
 from embodied.kinds import metrics
 from embodied.kinds.shipped.ask import ask_environments
@@ -488,21 +486,6 @@ def test_the_listener_tells_how_often_told_ways_are_understood(seen):
     stopped = Step(Pose(0), Mode.MAIN, "", (0,), "none", (), (1,), Ask(), reply, Pose(0))
     episode = Episode(find_tasks(1)[0], (stopped,), "limit")
     assert followed_replies([episode], {"grid": seen}) == (0, 1)
-
-
-def test_the_gymnasium_wrapper_speaks_in_messages():
-    env = Messages(HelpGymEnv(find_env, find_tasks(3), SensorSuite()))
-    text, info = env.reset(seed=1)
-    assert env.observation_space.contains(text) and "find" in text
-    assert [m["role"] for m in info["messages"]] == ["system", "user"]
-    names = info["schema"]["properties"]["action"]["enum"]
-    assert "stop" in names and "go 0" in names
-    after, reward, ended, cut, info = env.step("go 0")
-    assert "You went" in after and not ended and not cut
-    _, _, _, _, info = env.step("fly")
-    assert "invalid_action" in info
-    _, _, ended, _, info = env.step("stop")
-    assert ended and "success" in info
 
 
 def test_a_model_that_sees_is_shown_numbered_views(answers):

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from embodied.agents.iliad.config import LearnerConfig
 from embodied.agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from embodied.agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
-from embodied.agents.iliad.show import ShowOptions, show
 from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import Nav, Repeated, ScaledDown, StudyOptions, Tables, Threaded, Timed, study_of
 from embodied.options import InputFolder, OutputFolder, Settings
@@ -114,6 +113,5 @@ register_learner(
                 "nav": (NavStudyOptions, partial(study, nav_setup)),
             },
         ),
-        show=(ShowOptions, show),
     )
 )

@@ -24,7 +24,7 @@ from embodied.errors import UnableError
 
 COMMANDS = (
     *("demo", "doctor", "assets", "house", "light", "render", "rollout", "view", "dataset", "features", "corpus"),
-    *("export", "train", "evaluate", "serve", "llm", "study", "show", "bench", "cache"),
+    *("export", "train", "evaluate", "serve", "llm", "study", "bench", "cache"),
 )
 """Subcommands in the order `--help` lists them; each is a module with `run(options)`, or with commands of its own:
 `COMMANDS`, or `commands(words)` of the command line."""

@@ -1,9 +1,8 @@
 """Measure speed and memory on this machine, as medians.
 
   houses, pictures, plays   generation, rendering, environment steps with help
-  views, seen               views of a panorama, steps with pixels
+  seen                      steps with pixels
   drive                     live pictures, and the steps of a body on wheels that sees them
-  gpu                       pictures, features and learning on a CUDA device; without one, a short check on the CPU
   bakes                     light a flat repeatedly
   light                     compare the ways of rendering with a path tracer
   moving                    compare what moves with a path tracer, and what a frame costs then; takes an hour, in pieces
@@ -14,20 +13,18 @@ Close other programs first.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.options import Option, OutputFolder, drawn_as
-from embodied.render.pictures import DRAWN, parse_pictures
+from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
-    from embodied.assets.catalogue import Catalogue
-    from embodied.bench.timing import Measure
+    pass
 
-PARTS = ("houses", "pictures", "views", "plays", "seen", "drive", "gpu", "bakes", "light", "moving")
+PARTS = ("houses", "pictures", "plays", "seen", "drive", "bakes", "light", "moving")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,21 +41,18 @@ class BenchOptions(Furnished, Printed):
 
 def run(args: BenchOptions) -> None:
     from embodied import gl
-    from embodied.bench import bakes, drive, episodes, light, seen, timing, views, world
+    from embodied.bench import bakes, drive, episodes, light, seen, timing, world
 
     parts = args.part or ["houses", "pictures", "plays"]
     if unknown := sorted(set(parts) - set(PARTS)):
         raise ValueError(f"unknown benchmark {unknown}; choose from {PARTS}")
     catalogue = catalogue_of(args)
-    lit = parse_pictures(args.pictures).quality or "fast"
     lines = {
         "houses": lambda: world.houses(catalogue, args.seed),
         "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.pictures),
-        "views": lambda: views.views(catalogue, args.cache, args.seed),
         "plays": lambda: episodes.plays(catalogue, args.seed),
         "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.pictures),
         "drive": lambda: drive.drive(catalogue, args.cache, args.seed, args.pictures),
-        "gpu": lambda: _gpu(catalogue, args.cache, args.seed, lit),
         "bakes": lambda: bakes.bakes(catalogue, args.cache, args.seed),
     }
     measures = []
@@ -83,11 +77,3 @@ def run(args: BenchOptions) -> None:
         facts["moving"] = moving.compare(catalogue, args.cache, args.out, seed=args.seed, progress=note)
         texts.append(moving.table(facts["moving"]))
     show(args, facts, "\n\n".join(texts))
-
-
-def _gpu(catalogue: Catalogue, cache: Path, seed: int, light: str) -> Iterator[Measure]:
-    """Agents do not know the benchmarks, so what learns is handed over here."""
-    from embodied.agents.vision.speed import works
-    from embodied.bench import gpu
-
-    return gpu.gpu(catalogue, cache, seed, light, works, progress=note)

@@ -232,12 +232,6 @@ def device_of(name: str | None) -> Any:
         ) from e
 
 
-def card() -> str | None:
-    """Name of the GPU that is used by default; None where there is none."""
-    device = device_of(None)
-    return str(device.name) if device.is_cuda else None
-
-
 def _context(model: mujoco.MjModel, worlds: int, size: tuple[int, int]) -> Any:
     """Context that MuJoCo Warp draws colour, depth and ids of every world with."""
     context = mjw.create_render_context(
