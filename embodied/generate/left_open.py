@@ -22,12 +22,10 @@ OPENNESS_STEPS = np.linspace(0, 1, 19)[1:]
 """Openness that is tried; of doors, every 5 degrees."""
 NEAR = 0.02
 """Metres that things may stand in the way: boxes around them are larger than they are."""
-LEFT = {"door": 0.05, "flap": 0.01, "drawer": 0.06, "lid": 0.4}
-"""Share of the parts of furniture that a household leaves open, in a house of middling disorder."""
-AJAR = {"door": (0.05, 0.5), "flap": (0.1, 0.3), "drawer": (0.1, 0.6), "lid": (1.0, 1.0)}
-"""How far."""
-ROOM_DOORS = {"bathroom": (0.6, (0.1, 0.4)), "toilet": (0.6, (0.1, 0.4))}
-"""By kind of room, the share of doors that stand ajar, and how far."""
+LEFT = {"door": (0.1, 0.05, 0.5), "drawer": (0.12, 0.1, 0.6), "lid": (0.8, 1.0, 1.0)}
+"""Share of the parts of furniture that a household leaves open at disorder 1, and how far, from and to."""
+BATHS, BATH_DOORS = ("bathroom", "toilet"), (0.6, 0.1, 0.4)
+"""Kinds of room whose doors stand ajar, and likewise how many of them, and how far."""
 
 
 def free_openness(house: House, catalogue: Catalogue) -> dict[str, float]:
@@ -52,30 +50,31 @@ def _swept(p: Placement, m: MovingPart) -> Iterator[tuple[shapely.Geometry, floa
         turn, shift = m.turn(openness)
         there = corners @ turn.T + shift
         outline = shapely.MultiPoint(there[:, :2] @ rotation(p.yaw).T + p.position[:2]).convex_hull
-        yield outline.buffer(-min(NEAR, 0.4 * float(np.ptp(m.box[:, 1])))), *(p.position[2] + there[:, 2].take([0, -1]))
+        yield (
+            outline.buffer(-min(NEAR, 0.4 * float(np.ptp(m.box[:, 1])))),
+            p.position[2] + there[:, 2].min(),
+            p.position[2] + there[:, 2].max(),
+        )
 
 
 def _meets(front: tuple, room: shapely.Polygon, others: list[tuple]) -> bool:
     outline, low, high = front
-    low, high = min(low, high) + NEAR, max(low, high) - NEAR
-    if not room.buffer(NEAR).contains(outline):
-        return True
-    return any(low < b[3] and high > b[2] and outline.intersects(b[1]) for b in others)
+    over = (b for _, b, bottom, top in others if low + NEAR < top and high - NEAR > bottom)
+    return not room.buffer(NEAR).contains(outline) or any(outline.intersects(b) for b in over)
 
 
 def left_open(house: House, catalogue: Catalogue) -> Moment:
     """All that the household has left open, by the house's seed: doors and drawers of furniture, more where it is
     untidy, and bathroom doors ajar. `left_open(house, catalogue).applied(house)` is such a house."""
-    openness: dict[str, float] = {}
     kinds = {r.id: r.kind for r in house.rooms}
-    for o in house.openings:
-        rng = stream(house.seed, "left open", o.id)
-        share, (least, most) = max(ROOM_DOORS.get(kinds[r], (0.0, (1.0, 1.0))) for r in o.rooms if r in kinds)
-        if o.kind == "door" and o.leaf_finish is not None and rng.random() < share:
-            openness[o.id] = round(min(float(rng.uniform(least, most)), o.angle / WIDEST), 3)
+    baths = [o for o in house.openings if o.kind == "door" and {kinds.get(r or "") for r in o.rooms} & {*BATHS}]
+    shares = {o.id: (*BATH_DOORS, o.angle / WIDEST) for o in baths if o.leaf_finish is not None}
     for name, free in free_openness(house, catalogue).items():
+        share, least, most = LEFT[next((k for k in LEFT if k in name.rpartition("/")[2]), "door")]
+        shares[name] = (share * house.disorder, least, most, free)
+    openness = {}
+    for name, (share, least, most, free) in shares.items():
         rng = stream(house.seed, "left open", name)
-        kind = next((k for k in LEFT if k in name.rpartition("/")[2]), "door")
-        if rng.random() < LEFT[kind] * 2 * house.disorder and free > 0:
-            openness[name] = round(min(float(rng.uniform(*AJAR[kind])), free), 3)
+        if rng.random() < share and free > 0:
+            openness[name] = round(min(float(rng.uniform(least, most)), free), 3)
     return Moment(openness=openness)

@@ -53,14 +53,7 @@ class Case:
 
 
 def hang(spec: mujoco.MjSpec, house: House, catalogue: Meshes, without: frozenset[str]) -> dict[str, Case]:
-    """Add the bodies, joints and regions of furniture to a spec that counts in degrees.
-
-    Args:
-      without: placements that are left out.
-
-    Returns:
-      Them by placement id.
-    """
+    """Add bodies, joints and regions of all furniture but some to a spec that counts in degrees; by placement id."""
     known = ((p, apart(catalogue.mesh, p)) for p in house.placements if p.id not in without)
     return {p.id: _case(spec, p, whole) for p, whole in known if whole is not None}
 
@@ -78,15 +71,9 @@ def _case(spec: mujoco.MjSpec, p: Placement, whole: TakenApart) -> Case:
         body = still.add_body(name=f"{p.id}_{m.name}", pos=turn @ m.origin + shift, quat=quat)
         handle = body.add_body(name=f"{p.id}_{m.name}_handle", pos=at)
         body.gravcomp = handle.gravcomp = float(m.kind in ("flap", "lid"))  # springs hold them
-        joint = body.add_joint(
-            name=joint_name(p, m.name),
-            type=mujoco.mjtJoint.mjJNT_SLIDE if is_drawer else mujoco.mjtJoint.mjJNT_HINGE,
-            axis=m.axis,
-            range=[0, m.reach * scale],
-            limited=True,
-            ref=value * m.reach * scale,
-            **PHYSICS[m.kind],
-        )
+        kind = mujoco.mjtJoint.mjJNT_SLIDE if is_drawer else mujoco.mjtJoint.mjJNT_HINGE
+        span = {"range": [0, m.reach * scale], "limited": True, "ref": value * m.reach * scale}
+        joint = body.add_joint(name=joint_name(p, m.name), type=kind, axis=m.axis, **span, **PHYSICS[m.kind])
         joint.userdata = [m.reach]  # openness 1
         bodies |= {m.name: Hung(body, at), f"{m.name}_handle": Hung(handle, (0.0, 0.0, 0.0))}
         if m.kind != "lid":
@@ -97,17 +84,8 @@ def _case(spec: mujoco.MjSpec, p: Placement, whole: TakenApart) -> Case:
 
 def _region(body: mujoco.MjsBody, name: str, corners: np.ndarray) -> None:
     """A box that is not drawn and touches nothing."""
-    body.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        pos=corners.mean(0),
-        size=np.ptp(corners, axis=0) / 2,
-        rgba=[0, 0, 0, 0],
-        group=4,
-        contype=0,
-        conaffinity=0,
-        mass=0,
-    )
+    box = {"type": mujoco.mjtGeom.mjGEOM_BOX, "pos": corners.mean(0), "size": np.ptp(corners, axis=0) / 2}
+    body.add_geom(name=name, **box, rgba=[0, 0, 0, 0], group=4, contype=0, conaffinity=0, mass=0)
 
 
 def joint_name(p: Placement, part: str) -> str:
