@@ -11,6 +11,7 @@ from handmade import HandCatalogue, furnished
 
 from embodied.envs.base import ActionError, DoorRule, HelpEnv
 from embodied.evaluation.rollout import play
+from embodied.gym.spaces import SpaceLayout, action_mask, decode, number
 from embodied.house.moment import Moment
 from embodied.interface import Close, Episode, FindObject, FollowRoute, Move, Open, Pose, Stop, Task, viewpoint
 from embodied.kinds import metrics
@@ -111,6 +112,25 @@ def test_agents_that_know_no_doors_arrive_under_other_rules(world, task, rule):
     assert metrics.success(episode, world.graph) == 1
     assert metrics.path_length(episode, world.graph) > world.graph.distance[episode.nodes[0], episode.nodes[-1]] + 0.5
     assert any(isinstance(s.action, Open) for s in episode.steps) == (DoorRule(rule) is DoorRule.PUSH)
+
+
+def test_actions_on_doors_have_numbers_of_their_own(world, task):
+    layout = SpaceLayout.of(KIND)
+    chosen = [Open(0), Open(15), Close(0), Close(15), Stop(), Move(3)]
+    assert [decode(number(a, layout), layout) for a in chosen] == chosen
+    assert len({number(a, layout) for a in chosen}) == len(chosen) and layout.actions == SpaceLayout().actions + 32
+    env = HelpEnv({HOUSE.name: world})
+    mask = action_mask(env.reset(task), layout)
+    assert {decode(int(k), layout) for k in np.flatnonzero(mask) if k > 20} == set(map(Open, env.observation.can_open))
+
+
+def test_a_renderer_that_turns_doors_draws_what_a_new_one_draws(world):
+    shut = {"door_1": 0.3}
+    with World(Moment(openness=shut).applied(HOUSE), HandCatalogue(), world.graph, world.cache) as anew:
+        for node in (0, len(world.graph.ids) - 1):
+            turned, fresh = world.with_doors(shut).panorama(node), anew.panorama(node)
+            assert np.array_equal(turned.ids, fresh.ids) and np.array_equal(turned.rgb, fresh.rgb)
+    assert not np.array_equal(world.panorama(0).ids, world.with_doors(shut).panorama(0).ids)
 
 
 def test_whoever_is_told_to_open_doors_arrives(world, task):
