@@ -147,7 +147,7 @@ def node_ahead(graph: NavGraph, pose: Pose) -> int | None:
 
 
 def door_actions(o: Observation) -> dict[str, Action]:
-    """Doors that can be opened and closed now, by the name that language models and agents over HTTP call it."""
+    """Opening and closing what can be opened and closed now, by the names that language models use."""
     return {**{f"open {k}": Open(k) for k in o.can_open}, **{f"close {k}": Close(k) for k in o.can_close}}
 
 
