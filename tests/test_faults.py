@@ -66,12 +66,11 @@ def played(here, tmp_path_factory) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("what", ["lerobot", "parquet", "view"])
+@pytest.mark.parametrize("what", ["lerobot", "view"])
 def test_episodes_of_another_data_sets_house_are_believed_nowhere(what, here, elsewhere, played, tmp_path, capsys):
     out, size = ["--out", str(tmp_path / "o")], ["--size", "16"]
     orders = {
         "lerobot": lambda file: ["export", "lerobot", "--episodes", str(file), *size, *out],
-        "parquet": lambda file: ["export", "parquet", "--episodes", str(file), *out],
         "view": lambda file: ["view", str(file.parent), "--episode", "0"],
     }
     assert cli.main([*orders[what](elsewhere), "--data", str(here.folder)]) == 2
@@ -93,17 +92,6 @@ def test_nodes_that_the_house_has_not_are_refused(here, played):
         from_json(Episode, json.dumps(body))
 
 
-@pytest.mark.slow
-def test_two_files_of_episodes_that_would_become_one_table_are_refused(here, played, tmp_path, capsys):
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "x.jsonl").write_bytes(played.read_bytes())
-    files = [str(tmp_path / name / "x.jsonl") for name in ("a", "b")]
-    out = tmp_path / "out"
-    assert cli.main(["export", "parquet", "--data", str(here.folder), "--out", str(out), "--episodes", *files]) == 2
-    assert "would become one table" in capsys.readouterr().err and not list(out.rglob("*.parquet"))
-
-
 # What is deleted ----------------------------------------------------------------------------------
 
 
@@ -113,7 +101,6 @@ def test_two_files_of_episodes_that_would_become_one_table_are_refused(here, pla
     [
         ["dataset", "vln", "--houses", "1", "--tasks", "4", "--pictures", "none", "--workers", "1"],
         ["evaluate", "vln", "--agent", "shortest", "--split", "val_seen"],
-        ["export", "parquet"],
         ["export", "r2r"],
         ["export", "lerobot", "--split", "val_seen", "--size", "16"],
     ],
@@ -242,10 +229,9 @@ for words in json.loads(sys.argv[1]):
 def test_somebody_without_a_home_and_a_name_gets_help_and_tables(here, tmp_path):
     bare = {"PATH": os.environ["PATH"], "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     out = ["--data", str(here.folder), "--out", str(tmp_path / "out")]
-    orders = json.dumps([["--help"], ["house", "--help"], ["export", "parquet", *out]])
+    orders = json.dumps([["--help"], ["house", "--help"], ["export", "r2r", *out]])
     done = subprocess.run([sys.executable, "-c", NAMELESS, orders], capture_output=True, text=True, env=bare)
     assert done.stdout.count("status 0\n") == 3 and done.stdout.count("usage: embodied") == 2, done.stderr[-2000:]
-    assert "README.md is its card\nstatus 0" in done.stdout
 
 
 def test_a_cache_that_cannot_be_written_is_named_with_what_to_do(capsys, tmp_path):

@@ -21,7 +21,7 @@ from embodied.agents.language_models.client import AnswerCache, Client, ServerSe
 from embodied.agents.language_models.completions import object_schema
 from embodied.agents.language_models.observations import oracle_names
 from embodied.agents.language_models.prompts import PromptBuilder, read_prompt
-from embodied.agents.language_models.routes import followed_replies, listener_arrives, paraphrased
+from embodied.agents.language_models.routes import followed_replies, listener_arrives
 from embodied.agents.language_models.transport import MOST_BYTES, completions_url, proxy_of
 from embodied.assets.catalogue import load_catalogue
 from embodied.assistants.ask import AskAssistant
@@ -463,19 +463,6 @@ def seen() -> Seen:
 def a_route(world: Seen, k: int) -> Route:
     path = world.graph.path(0, 20)
     return Route(f"grid_{k}", path, 0, 0, PlainLanguage().route(world, path, 0.0, rng=np.random.default_rng(0)))
-
-
-def test_paraphrases_that_lead_elsewhere_are_dropped_and_counted(seen, answers):
-    routes = [("grid", a_route(seen, k)) for k in range(4)]
-    good = "Leave the kitchen and go into the living room. Stop in the living room."
-    texts = [f'{{"instruction": "{good}"}}', '{"instruction": "Fly to the moon."}', "<html>"]
-    texts.append(json.dumps({"instruction": routes[0][1].instruction}))
-    with ChatServer(lambda r: said(texts[len(server.requests) - 1])) as server:
-        found = paraphrased(routes, {"grid": seen}, client_of(server, answers, together=1))
-        told = [r["messages"][1]["content"] for r in server.requests]
-    assert (found.asked, found.lost, found.invalid, found.unchanged) == (4, 1, 1, 1)
-    assert [r.instruction for r in found.routes] == [good] and found.failing == 0.75 and found.usage.calls == 4
-    assert found.routes[0].path == routes[0][1].path and len(set(told)) == 4, "every one in another style"
 
 
 def test_the_listener_tells_how_often_told_ways_are_understood(seen):

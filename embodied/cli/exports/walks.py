@@ -1,8 +1,7 @@
-"""Continuous walks of an expert in `vln` data, as published learners read them: images, actions, instructions."""
+"""Continuous walks of an expert in `vln` data, for LeRobot."""
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -24,10 +23,10 @@ class WalkOptions(OfData, Cached):
     width: Annotated[int, Option(video_side, "PIXELS")] = 256
     """Width and height of the pictures."""
     depth: bool = False
-    """Also write videos of depth (lerobot-vlnce)."""
+    """Also write videos of depth."""
 
 
-def run_walks(form: str, args: WalkOptions) -> None:
+def run_walks(args: WalkOptions) -> None:
     from embodied.datasets.habitat import route_episodes
     from embodied.datasets.store import dataset_of
     from embodied.datasets.vlnce import export_walks
@@ -37,14 +36,13 @@ def run_walks(form: str, args: WalkOptions) -> None:
     data = dataset_of(args.data, "vln")
     worlds = data_worlds(args.data, args.split, args.cache, None)
     walks = route_episodes(data.tasks(args.split), worlds)[: args.tasks]
-    how: dict[str, Any] = {"action_noise": args.action_noise, "split": args.split, "depth": args.depth}
+    how: dict[str, Any] = {"action_noise": args.action_noise, "depth": args.depth}
     how |= {"seed": data.config.seed, "camera": CameraConfig(args.width, args.width)}
-    steps = export_walks(form, args.out, walks, worlds, watch=lambda e: bar(e, "walks", "walk"), **how)
+    steps = export_walks(args.out, walks, worlds, watch=lambda e: bar(e, "walks", "walk"), **how)
     for world in worlds.values():
         world.close()
     facts = {"walks": len(walks), "steps": steps, "out": str(args.out)}
     show(args, facts, f"{len(walks)} walks, {steps} steps in {args.out}")
 
 
-for _form in ("vlnce", "lerobot-vlnce"):
-    register_export(Export(_form, WalkOptions, functools.partial(run_walks, _form)))
+register_export(Export("lerobot-vlnce", WalkOptions, run_walks))
