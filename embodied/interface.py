@@ -242,7 +242,34 @@ class GoTo:
     """Ids of things."""
 
 
-Goal = FindObject | FollowRoute | FindDescribed | GoTo
+@dataclass(frozen=True)
+class NextGoal:
+    """One goal of a sequence (GOAT-Bench)."""
+
+    form: str
+    """'object', 'description' or 'image': how the agent is told."""
+    category: str
+    """Noun of the thing, as the agent is told."""
+    placements: tuple[str, ...]
+    nodes: tuple[int, ...]
+    """Nodes where it counts as found."""
+    words: str
+    picture: int | None = None
+    """Node of the picture that is shown."""
+
+
+@dataclass(frozen=True)
+class FindInTurn:
+    """Find one thing after the other, in the same episode."""
+
+    goals: tuple[NextGoal, ...]
+
+    @property
+    def placements(self) -> tuple[str, ...]:
+        return tuple(p for goal in self.goals for p in goal.placements)
+
+
+Goal = FindObject | FollowRoute | FindDescribed | GoTo | FindInTurn
 
 
 @dataclass(frozen=True)

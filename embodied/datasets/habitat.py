@@ -1,8 +1,8 @@
-"""Episodes of continuous navigation in Habitat's files: VLN-CE (R2R_VLNCE_v1-3) and ObjectNav, .json.gz.
+"""Episodes of continuous navigation in Habitat's files: VLN-CE (R2R_VLNCE_v1-3), ObjectNav and GOAT-Bench, .json.gz.
 
   <split>/<split>.json.gz       VLN-CE: episodes and the vocabulary; ObjectNav: categories, with one house a file below
   <split>/<split>_gt.json.gz    VLN-CE: where an expert was and what it did, by episode
-  <split>/content/<scene>.json.gz    ObjectNav: goals by category with viewpoints, and episodes
+  <split>/content/<scene>.json.gz    ObjectNav, GOAT-Bench: goals by category with viewpoints, and episodes
 
 Habitat's frame has y up: (x, y, z) there is (x, z, -y) here. An agent looks along -z; rotations are (x, y, z, w).
 """
@@ -35,9 +35,10 @@ from embodied.envs.continuous import (
     ShortestPathFollower,
     seen_from,
 )
-from embodied.interface import FollowRoute, Place, Task
+from embodied.interface import FindInTurn, FollowRoute, Place, Task
 from embodied.mattersim.conventions import tokenised
 from embodied.seeds import stream
+from embodied.tasks.goals import GOAT_REACH, find_instances
 
 INSTRUCTION_TOKENS = 200
 """Tokens of an instruction in VLN-CE's files, filled up with zeros."""
@@ -207,6 +208,48 @@ def write_vlnce(
         _write(home / f"{split}.json.gz", {"episodes": episodes, "instruction_vocab": vocabulary}),
         _write(home / f"{split}_gt.json.gz", experts),
     ]
+
+
+def write_goat(folder: Path, split: str, tasks: Iterable[Task], places: Mapping[str, Place]) -> list[Path]:
+    """<split>.json.gz, empty, and <split>/content/<scene>.json.gz of GOAT-Bench for `goat` tasks; returns all."""
+    scenes: dict[str, tuple[list[dict[str, Any]], dict[str, dict[str, Any]], dict[str, tuple[int, ...]]]] = {}
+    for task in tasks:
+        assert isinstance(task.goal, FindInTurn), "goat tasks find things in turn"
+        place, name = places[task.world], task.world
+        if name not in scenes:
+            scenes[name] = [], {}, {x.placement: x.nodes for x in find_instances(place, GOAT_REACH)}
+        episodes, goals, nodes = scenes[name]
+        for goal in task.goal.goals:
+            things = goals.setdefault(f"{name}.glb_{goal.category}", {})
+            for thing in goal.placements:
+                known = things.setdefault(thing, _goat_goal(place, thing, goal.category, nodes[thing]))
+                if goal.form == "description":
+                    known["lang_desc"] = goal.words.removeprefix("find ")
+        start, floor = place.graph.positions[task.start.node], float(place.house.storeys[0].elevation)
+        in_turn = [[g.category, g.form, None if g.form == "object" else g.placements[0]] for g in task.goal.goals]
+        one: dict[str, Any] = {"episode_id": str(len(episodes)), "scene_id": f"embodied/{name}/{name}.glb"}
+        one |= {"start_position": to_habitat((*start[:2], floor)), "start_rotation": rotation_of(task.start.yaw)}
+        episodes.append(one | {"info": {}, "goals": [], "tasks": in_turn})
+    home = Path(folder) / split
+    written = [_write(home / f"{split}.json.gz", {"episodes": [], "goals": {}})]
+    for name, (episodes, goals, _) in scenes.items():
+        body = {"episodes": episodes, "goals": {key: [*things.values()] for key, things in goals.items()}}
+        written.append(_write(home / "content" / f"{name}.json.gz", body))
+    return written
+
+
+def _goat_goal(place: Place, thing: str, category: str, nodes: Sequence[int]) -> dict[str, Any]:
+    """A thing that may be looked for, its viewpoints and a picture from the nearest of them."""
+    p, floor, states = place.house.placement_by_id[thing], float(place.house.storeys[0].elevation), []
+    for x, y, _ in place.graph.positions[list(nodes)]:
+        rotation = rotation_of(math.atan2(p.position[1] - y, p.position[0] - x))
+        states.append({"position": to_habitat((x, y, floor)), "rotation": rotation})
+    eye = {"position": to_habitat(place.graph.positions[nodes[0]]), "rotation": states[0]["rotation"]}
+    about: dict[str, Any] = {"object_category": category, "object_id": thing, "position": to_habitat(p.position)}
+    views = [{"agent_state": state, "iou": None} for state in states]
+    images = [eye | {"hfov": 90, "image_dimensions": [512, 512]}]
+    about |= {"view_points": views, "image_goals": images, "lang_desc": None}
+    return about | {"children_object_categories": []}
 
 
 def read_vlnce(path: Path) -> list[ContinuousEpisode]:

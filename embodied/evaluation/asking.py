@@ -74,8 +74,7 @@ def _among_rivals(episode: Episode, goal: FindDescribed) -> AskCounts:
 def late_env(make_env: Callable[[], HelpEnv], share: float) -> HelpEnv:
     """An environment in which nobody can be asked before a share of the task's steps has passed."""
     env = make_env()
-    if share and env.assistant is not None:
-        env.assistant = LateAssistant(env.assistant, share)
+    env.assistant = env.assistant and LateAssistant(env.assistant, share)
     return env
 
 

@@ -140,8 +140,6 @@ ASKER_RULES: Mapping[str, PricedAskRule] = {
 }
 
 
-# Collecting first -------------------------------------------------------------------------------
-
 COLLECT = 0.4
 """Share of the steps in which it collects."""
 

@@ -176,6 +176,31 @@ class PerfectInterpreter(PerEpisodePolicy):
         return Move(int(rng.choice(fewest)))
 
 
+class RecognisingExplorer(PerEpisodePolicy):
+    """Goes where it has been least and stops at what is wanted, which it recognises; that alone is privileged."""
+
+    def __init__(self, remembers: bool) -> None:
+        """`remembers`: where it has been goes on across goals, and it goes back to what it has seen."""
+        self._remembers = remembers
+
+    def new_memory(self) -> Any:
+        return {}, Counter[int]()
+
+    def act_one(self, o: Observation, s: Situation, memory: Any, rng: np.random.Generator) -> Action:
+        ways, visited = memory
+        if o.time_on_task == 0 and not self._remembers:
+            ways.clear()
+            visited.clear()
+        ways[s.pose.node] = s.candidate_nodes
+        visited[s.pose.node] += 1
+        if s.pose.node in s.targets or not s.candidate_nodes:
+            return Stop()
+        if (known := step_on_known_way(ways, s.pose.node, ways.keys() & {*s.targets})) is not None:
+            return Move(s.candidate_nodes.index(known))
+        visits = np.array([visited[v] for v in s.candidate_nodes])
+        return Move(int(rng.choice(np.flatnonzero(visits == visits.min()))))
+
+
 class SubgoalListener:
     """VNLA: does what the advisor's sentence says, word by word; otherwise a monocular random walk.
 

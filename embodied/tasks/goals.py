@@ -10,6 +10,8 @@ import numpy as np
 from embodied.house.house import House, Placement
 from embodied.interface import Place
 
+GOAT_REACH = 2.0
+"""Metres within which a thing of a sequence counts as found, in its room."""
 NOT_OBJECTS = frozenset({"person"})
 """Classes that are never looked for."""
 

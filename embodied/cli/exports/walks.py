@@ -1,4 +1,4 @@
-"""Continuous walks of an expert in `vln` data, for LeRobot."""
+"""Continuous walks of an expert in `vln` data, for LeRobot, and goals of `goat` data."""
 
 from __future__ import annotations
 
@@ -45,4 +45,22 @@ def run_walks(args: WalkOptions) -> None:
     show(args, facts, f"{len(walks)} walks, {steps} steps in {args.out}")
 
 
+@dataclass(frozen=True, kw_only=True)
+class GoatOptions(OfData):
+    """Tasks of `goat` data as GOAT-Bench's files: sequences of goals with viewpoints, descriptions and images."""
+
+    split: str = "test_unseen"
+    """The split that is written."""
+
+
+def run_goat(args: GoatOptions) -> None:
+    from embodied.datasets.habitat import write_goat
+    from embodied.datasets.store import dataset_of
+
+    data = dataset_of(args.data, "goat")
+    files = write_goat(args.out, args.split, data.tasks(args.split), data.split(args.split).worlds)
+    show(args, {"files": len(files), "out": str(args.out)}, f"{len(files)} files in {args.out}")
+
+
+register_export(Export("goat", GoatOptions, run_goat))
 register_export(Export("lerobot-vlnce", WalkOptions, run_walks))
