@@ -201,7 +201,7 @@ def _opened(p: Placement, openness: Mapping[str, float]) -> Placement:
 
 def _shining(house: House, light: Light, poses: Mapping[str, RigidPose]) -> Light:
     """A light, where its lamp is now."""
-    if light.placement not in poses:
+    if light.placement is None or light.placement not in poses:
         return light
     p, pose = house.placement_by_id[light.placement], poses[light.placement]
     x, y, z = pose.points(RigidPose.upright(p.position, p.yaw).local(np.array([light.position])))[0].tolist()

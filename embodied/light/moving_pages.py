@@ -316,7 +316,7 @@ class HousePages:
         some = lambda a: a.reshape(-1, HALF_TILE, HALF_TILE, 3)[:, 1::2, 1::2].reshape(-1, 3)  # soft enough for lamps
         position, normal = some(take("samples")), some(take("sample_normals"))
         none = np.zeros(len(position), bool)
-        e = sum(direct(lamp, position, normal, none, blocked) for lamp, blocked in self._burning)
+        e = np.sum([direct(lamp, position, normal, none, blocked) for lamp, blocked in self._burning], axis=0)
         albedo = np.repeat([LINEAR[r.held.albedo].mean((0, 1)) for _, r in near], [len(t) for t in tiles], axis=0)
         boxes = np.sort(take("high") - take("low"), axis=1)[:, 1:].prod(1)
         area = np.minimum(boxes, np.quantile(boxes, 0.75)) / (SAMPLES // 4)  # boxes of several surfaces say too much
@@ -345,7 +345,8 @@ class HousePages:
             area += sum(float(areas_of(m.vertices[m.faces]).sum()) for m in r.meshes if m.owner == owner)
         if not area:
             return None
-        return fitting_of(lamp, *(np.concatenate(column) for column in zip(*rows, strict=True)), area)
+        position, normal, sent = (np.concatenate(column) for column in zip(*rows, strict=True))
+        return fitting_of(lamp, position, normal, sent, area)
 
     def lamplight(self, s: Surface, pose: RigidPose) -> np.ndarray | float:
         """(n, 3) light of luxels from lamps that are carried."""
