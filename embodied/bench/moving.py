@@ -16,7 +16,7 @@ import numpy as np
 
 from embodied.assets.cache import write_json
 from embodied.assets.catalogue import Catalogue
-from embodied.assets.json_file import read_json
+from embodied.assets.json_file import parse_file
 from embodied.bench.light import VIEW_ANGLE, psnr
 from embodied.bench.moments import BENCH_ROBOT, LOOKED_FROM, MOVING_HOURS, Staged, WithRobot, staged, truth, with_robot
 from embodied.bench.timing import one_core
@@ -105,12 +105,12 @@ def compare(
         if not path.exists():
             facts = truth(s, known, cache, folder / f"{seed + k}.npz")
             write_json(path, judged(s, known, cache, facts, folder), indent=1)
-        rows += read_json(path)
+        rows += parse_file(path)
         progress(f"house {seed + k}: {path}")
     path = folder / "prices.json"
     if not path.exists():
         write_json(path, prices(staged(known, seed, 0), known, cache), indent=1)
-    return {"rows": rows, "prices": read_json(path)}
+    return {"rows": rows, "prices": parse_file(path)}
 
 
 def prices(s: Staged, catalogue: WithRobot, cache: Path) -> list[dict]:
