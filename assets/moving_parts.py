@@ -416,9 +416,9 @@ def _furnished(m: MovingPart, row: Row, finish: Finish, empty: bool) -> tuple[li
         drum = lathe([(0, deep), (r + RIM, deep), (r + RIM, 0), (r, 0), (r, deep + 0.01), (0, deep + 0.01)], 24)
         return [part(skin, drum.hung((x0 + x1) / 2, y0, (z0 + z1) / 2))], []
     (a, _, c), (b, _, d) = m.box
-    walls = [((a, c), (x0, d)), ((x1, c), (b, d)), ((x0, c), (x1, z0)), ((x0, z1), (x1, d))]
-    boxes = [box([p[0], y0, p[1]], [q[0], y1, q[1]]) for p, q in walls]
-    inside = [part(skin, *boxes, box([a, y1, c], [b, y1 + 0.01, d]))]
+    walls = [((a, y0, c), (x0, y1, d)), ((x1, y0, c), (b, y1, d)), ((x0, y0, c), (x1, y1, z0))]
+    walls += [((a, y1, c), (b, y1 + 0.01, z1)), ((x0, y0, z1), (x1, y0 + RIM if "basin" in row else y1, d))]
+    inside = [part(skin, *(box(p, q) for p, q in walls))]
     boards = boards_of(m)
     built = [part(skin, *(box(p, q, 0.001) for p, q in boards))] if boards and empty else []
     if m.kind == "drawer":
