@@ -5,9 +5,12 @@ panoramas, and the same command without it renders them later.
 
     embodied dataset hanna --out DATA --scale mini
     embodied dataset from-people --people STUDY.people --data DATA --out DIR
+    embodied dataset vqa --out DIR --houses 40 --test-houses 10 --area 45 80
 
 The second writes DATA again with the words of people who took part in `embodied serve`: their routes for HANNA, VLN and
 ILIAD, their sub-goals for VNLA, and, where they gave stars, rater.json: the simulated rater that resembles them most.
+The third films walks through lit houses and asks questions about them, with exact answers: --tasks and
+--evaluation-tasks are the most questions to train with and to test with.
 """
 
 from __future__ import annotations
@@ -17,8 +20,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from embodied.cli.common import Furnished, Printed, check_machine, note, pause, show
+from embodied.cli.vqa import VQA, make
 from embodied.kinds.splits import DATASET_SCALES, DatasetSize, described
-from embodied.options import HOUSES, Count, CubeFace, InputFolder, Option, OutputFolder, drawn_as, whole
+from embodied.options import HOUSES, Count, CubeFace, InputFolder, InputPath, Option, OutputFolder, drawn_as, whole
 from embodied.render.pictures import PICTURES, PictureSettings, in_words, parse_pictures
 
 FROM_PEOPLE = "from-people"
@@ -28,7 +32,7 @@ SCALE_HELP = {name: described(name) for name in DATASET_SCALES}
 @dataclass(frozen=True, kw_only=True)
 class DatasetOptions(Furnished, Printed):
     kind: Annotated[str, Option(metavar="KIND", name="kind")]
-    """The kind of task: find, goat, vln, vnla, hanna, hari, MODULE:NAME of your own, or from-people."""
+    """The kind of task: find, goat, vln, vnla, hanna, hari, MODULE:NAME of your own, from-people, or vqa (questions)."""
     out: OutputFolder
     """Folder of the data set."""
     scale: Annotated[str | None, Option(words=tuple(DATASET_SCALES), helps=SCALE_HELP)] = None
@@ -60,6 +64,8 @@ class DatasetOptions(Furnished, Printed):
     """from-people: the data set that the study used."""
     people_only: bool = False
     """from-people: leave out all routes but people's."""
+    seed_file: InputPath | None = None
+    """vqa: seeds of the houses of a hidden split, one per line, instead of --houses."""
     pictures: Annotated[str | None, drawn_as(("none", *PICTURES))] = None
     """How the panorama of every viewpoint is drawn (default: as existing panoramas are, else fast; hari:
     none)."""
@@ -95,6 +101,9 @@ def from_people(args: DatasetOptions) -> None:
 def run(args: DatasetOptions) -> None:
     if args.kind == FROM_PEOPLE:
         from_people(args)
+        return
+    if args.kind == VQA:
+        make(args)
         return
     from tqdm import tqdm
 

@@ -7,6 +7,7 @@
     embodied evaluate hanna --data DATA --agent my_module:Policy my_learner:LEARNER=RUN
     embodied evaluate ask --seed-file FILE --agent submissions/team_7
     embodied evaluate my_task:KIND --data DATA
+    embodied evaluate vqa --data DATA
 
 The command prints a table with 95 % confidence intervals. With --out it also writes the table as Markdown and
 JSON, and all episodes, which `embodied view` shows. Every answer of a language model is kept in --answers, so that the
@@ -28,6 +29,8 @@ from embodied.agents.language_models.client import WithModel, client_of
 from embodied.agents.options import Encoded, Threaded
 from embodied.agents.vision.config import GOAL_IMAGES
 from embodied.cli.common import Furnished, Printed, bar, catalogue_of, note, show
+from embodied.cli.vqa import VQA
+from embodied.cli.vqa import evaluate as answer_questions
 from embodied.options import Count, InputFolder, InputPath, Option, OutputFolder
 
 if TYPE_CHECKING:
@@ -106,7 +109,7 @@ class OfTrained:
 @dataclass(frozen=True, kw_only=True)
 class EvaluateOptions(TaskOptions, Results, OfTrained, WithModel, Encoded, Threaded, Furnished):
     kind: Annotated[str, Option(metavar="KIND", name="kind")]
-    """The kind of task: find, goat, vln, vnla, hanna, hari, ask, doors, or MODULE:NAME of your own."""
+    """The kind of task: find, goat, vln, vnla, hanna, hari, ask, doors, MODULE:NAME of your own, or vqa (questions)."""
     agent: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
     """Agents to evaluate: baselines by name, 'shipped', a file or run folder of `embodied train`, 'llm', MODULE:CLASS
     of your own policy, MODULE:LEARNER=RUN of your own learner, or a folder with an agent.py
@@ -183,6 +186,9 @@ class Evaluation:
 def run(args: EvaluateOptions) -> None:
     from embodied.locks import locked
 
+    if args.kind == VQA:
+        answer_questions(args)
+        return
     evaluation = parsed(args)
     with locked(args.out) if args.out else contextlib.nullcontext():
         for split in opened_splits(evaluation) if evaluation.agents else ():

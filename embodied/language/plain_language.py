@@ -107,3 +107,30 @@ def with_article(noun: str) -> str:
         return f"some {noun}"
     vowel = start[0] in "aeiou" and not SPOKEN_YOU_OR_WON.match(start)
     return f"an {noun}" if vowel or start.startswith(SILENT_H) or SPELLED.match(start) else f"a {noun}"
+
+
+IRREGULAR_PLURALS = {"knife": "knives", "loaf": "loaves", "person": "people", "mouse": "mice", "child": "children"}
+"""By the end of the word, as are -shelf and -man; others follow the rules of -s, -es and -ies."""
+UNCOUNTED = "art artwork bedding earthenware foliage laundry liquid luggage mail milk money paperwork pottery salt soap"
+"""Last words of nouns, beside MASSES, that have no plural."""
+
+
+def plural(noun: str) -> str:
+    """'mugs', 'boxes', 'bookshelves', 'rows of books'; nouns that are plural in form or not counted stay."""
+    parts = re.fullmatch(r"(.*?)(\w+)((?: (?:of|on|with|in) .*)?)", noun)
+    if parts is None or with_article(noun).startswith("some ") or parts[2] in UNCOUNTED.split():
+        return noun
+    before, last, after = parts.groups()
+    if last in IRREGULAR_PLURALS:
+        last = IRREGULAR_PLURALS[last]
+    elif last.endswith(("shelf", "scarf")):
+        last = last[:-1] + "ves"
+    elif last in ("man", "woman"):
+        last = last[:-2] + "en"
+    elif last.endswith(("s", "x", "z", "ch", "sh")):
+        last += "es"
+    elif last.endswith("y") and last[-2:-1] not in tuple("aeiou"):
+        last = last[:-1] + "ies"
+    else:
+        last += "s"
+    return f"{before}{last}{after}"

@@ -1,0 +1,152 @@
+"""Building a set of questions: houses are lit and filmed, one at a time; then all walks are asked about and thinned."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+
+from embodied.assets.cache import digest, drafts, write_json
+from embodied.assets.catalogue import load_catalogue
+from embodied.datasets.build import Watch, for_each_unit, make_dataset_house
+from embodied.datasets.checks import DatasetError
+from embodied.datasets.vqa.scene import WalkScene
+from embodied.datasets.vqa.scoring import VqaQuestion, thinned
+from embodied.datasets.vqa.types import TYPES
+from embodied.datasets.vqa.walks import Walk, cameras, film, tour
+from embodied.generate import HouseConfig
+from embodied.house.house import House
+from embodied.locks import locked
+from embodied.navigation.connectivity import from_matterport, to_matterport
+from embodied.records import from_plain, load_lines, read_json, save_lines, to_json
+from embodied.render.pictures import parse_pictures
+from embodied.seeds import stream
+from embodied.world import World
+
+WALKS, ROOMS, SPARE, WRITERS = 2, 4, 6, 3
+"""Walks through a house; most rooms of each; times as many questions as are wanted that are drawn; people who ask."""
+
+
+@dataclass(frozen=True)
+class VqaConfig:
+    """All that a set of questions depends on: number of houses, and most questions, of each split; the area of a house,
+    m2; how frames are drawn; seeds of the houses of a hidden split."""
+
+    houses: Mapping[str, int]
+    questions: Mapping[str, int]
+    seed: int = 0
+    area: tuple[float, float] = (45.0, 80.0)
+    pictures: str = "fast"
+    seeds: tuple[int, ...] = ()
+
+
+def build_vqa(config: VqaConfig, folder: Path, cache: Path, *, workers: int = 1, watch: Watch | None = None) -> VqaData:
+    """Film what is missing, ask, and write vqa.json last; the same command goes on after an interruption.
+
+    Raises:
+      LockedError: another process builds it.
+      DatasetError: the folder holds another set.
+    """
+    folder, path, every = Path(folder).resolve(), Path(folder) / "config.json", dict[str, list[VqaQuestion]]()
+    with locked(folder):
+        if path.exists() and from_plain(VqaConfig, read_json(path)) != config:
+            raise DatasetError(f"{folder} holds questions of other settings; choose another folder")
+        write_json(path, dataclasses.asdict(config))
+        names = [(split, i) for split, n in config.houses.items() for i in range(n)]
+        for_each_unit(film_house, names, (config, folder, cache), workers=workers, watch=watch)
+        for split, n in config.houses.items():
+            every[split] = ask(config, scenes_of(folder, split, n, cache), config.questions[split], workers)
+            save_lines(folder / f"questions_{split}.jsonl", every[split])
+        counts = {split: Counter(q.type for q in questions) for split, questions in every.items()}
+        about = {"counts": counts, "digest": digest([to_json(q) for questions in every.values() for q in questions])}
+        write_json(folder / "vqa.json", about, indent=1)
+        return VqaData(folder)
+
+
+def film_house(which: tuple[str, int], config: VqaConfig, folder: Path, cache: Path) -> str:
+    """Make a house, light it and film its walks, unless its folder is there; returns its name."""
+    name = "{}_{:04d}".format(*which)
+    home, catalogue = folder / "houses" / name, load_catalogue(cache)
+    if home.exists():
+        return name
+    home.parent.mkdir(parents=True, exist_ok=True)
+    seed = config.seeds[which[1]] if config.seeds else config.seed
+    house, graph = make_dataset_house(seed, name, HouseConfig(area=config.area), catalogue)
+    rng, pictures = stream(seed, "vqa", name), parse_pictures(config.pictures)
+    with drafts(home.parent) as private, World(house, catalogue, graph, cache, pictures) as world:
+        for k in range(WALKS):
+            path, stops = tour(house, graph, ROOMS, rng=rng)
+            track, to = cameras(graph, path, stops, rng.uniform(-np.pi, np.pi)), private / name / f"walk_{k}"
+            rooms = tuple(graph.room_of_node[n] for n in stops)
+            walk = Walk(f"{name}_{k}", name, rooms, tuple(film(world, [*track], to)))
+            write_json(to / "walk.json", dataclasses.asdict(walk))
+        house.save(private / name / "house.json")
+        to_matterport(graph, house, private / name / "connectivity.json")
+        (private / name).rename(home)
+    return name
+
+
+def scenes_of(folder: Path, split: str, houses: int, cache: Path) -> list[WalkScene]:
+    """All walks of a split, each with the classes that those of other houses show."""
+    scenes, catalogue = list[WalkScene](), load_catalogue(cache)
+    for home in (folder / "houses" / f"{split}_{i:04d}" for i in range(houses)):
+        house, graph = House.load(home / "house.json"), from_matterport(home / "connectivity.json")
+        walks = [from_plain(Walk, read_json(home / f"walk_{k}" / "walk.json")) for k in range(WALKS)]
+        scenes += [WalkScene(walk, house, graph, catalogue) for walk in walks]
+    shown = [(s.house.name, name) for s in scenes for name in sorted({p.object_class for p in s.things})]
+    for scene in scenes:
+        scene.elsewhere = [name for house_name, name in shown if house_name != scene.house.name]
+    return scenes
+
+
+def ask(config: VqaConfig, scenes: Sequence[WalkScene], wanted: int, workers: int = 1) -> list[VqaQuestion]:
+    """Questions, type by type: as many of each as there are, up to a number that all share."""
+    parallel, most = joblib.Parallel(n_jobs=workers), -(-SPARE * wanted // (len(TYPES) * len(scenes)))
+    parts = parallel(joblib.delayed(asked_about)(s, most, config.seed) for s in scenes)
+    of_type = ([q for part in parts for q in part if q.type == name] for name in TYPES)
+    kept = parallel(joblib.delayed(thinned)(qs, config.seed) for qs in of_type)
+    level = max(n for n in range(max(map(len, kept)) + 1) if sum(min(len(qs), n) for qs in kept) <= wanted)
+    rng = stream(config.seed, "kept", wanted)
+    return [qs[i] for qs in kept for i in sorted(rng.permutation(len(qs))[:level].tolist())]
+
+
+def asked_about(scene: WalkScene, most: int, seed: int) -> list[VqaQuestion]:
+    """Up to so many questions of every type about a walk, in the words of several people."""
+    questions: dict[tuple[str, ...], VqaQuestion] = {}
+    for name, writer in itertools.product(TYPES, range(WRITERS)):
+        s = scene.asked(name, stream(seed, "questions", scene.walk.name, name, writer))
+        for q in itertools.islice(TYPES[name](s), -(-most // WRITERS)):
+            number = f"{scene.walk.name}_{name}_{len(questions)}"
+            if len({*q.options}) == len(q.options):
+                questions.setdefault((name, *q.about), dataclasses.replace(q, id=number))
+    return [*questions.values()]
+
+
+class VqaData:
+    """A whole set of questions in a folder; `about` has counts by split and type, and the digest of all questions."""
+
+    def __init__(self, folder: Path) -> None:
+        """
+        Raises:
+          DatasetError: none, or not whole.
+        """
+        self.folder = Path(folder)
+        if not (self.folder / "vqa.json").exists():
+            raise DatasetError(f"{folder} is no whole set of questions; build it with `embodied dataset vqa --out DIR`")
+        self.about: dict[str, Any] = read_json(self.folder / "vqa.json")
+
+    def questions(self, split: str) -> list[VqaQuestion]:
+        """
+        Raises:
+          DatasetError: no such split.
+        """
+        if split not in self.about["counts"]:
+            raise DatasetError(f"unknown split {split!r}; {self.folder} has {list(self.about['counts'])}")
+        return [*load_lines(self.folder / f"questions_{split}.jsonl", VqaQuestion)]

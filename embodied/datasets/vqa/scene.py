@@ -1,0 +1,137 @@
+"""A walk as somebody sees it who asks about it: what was seen and when, names that fit one thing only, and words."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from embodied.assets.catalogue import Catalogue
+from embodied.assets.json_file import read_toml
+from embodied.datasets.vqa.scoring import VqaQuestion
+from embodied.datasets.vqa.walks import GLIMPSE, Walk
+from embodied.geometry import wrap
+from embodied.house.house import House, Placement
+from embodied.house.shapes import footprint
+from embodied.language import speakers
+from embodied.language.clauses import Referent
+from embodied.language.lexicon import ROOM_NOUNS, UNFIT, Word, lexicon_of, says
+from embodied.language.plain_language import plural, with_article
+from embodied.navigation.graph import NavGraph
+
+ASKING: Mapping[str, Any] = read_toml(Path(speakers.__file__).with_name("vqa.toml"))
+"""Type to habit to templates; and 'alike', groups of classes that people do not tell apart."""
+ALIKE: Mapping[str, list[str]] = {name: group for group in ASKING["alike"] for name in group}
+
+
+class WalkScene:
+    """All that questions about a walk rest on, and who asks: `by` draws from `rng`.
+
+    `clear`, `glimpsed`: what is seen clearly, and at all, to the first frame that shows it; `rooms`: those that their
+    kind tells from all others.
+    """
+
+    def __init__(self, walk: Walk, house: House, graph: NavGraph, catalogue: Catalogue) -> None:
+        self.walk, self.house, self.graph, self.elsewhere = walk, house, graph, list[str]()
+        self.lexicon, self.assets = lexicon_of(catalogue), {p.id: catalogue.assets[p.asset] for p in house.placements}
+        self.kind, self.by, self.rng = "", speakers.SPEAKERS[0], np.random.default_rng(0)
+        self.clear = _firsts(f.clear for f in walk.frames)
+        self.glimpsed = _firsts([o for o, share in f.shares.items() if share >= GLIMPSE] for f in walk.frames)
+        self.things = [p for p in house.placements if p.id in self.clear and p.object_class not in UNFIT]
+        kinds = [r.kind for r in house.rooms]
+        self.rooms = {r.id: r.kind for r in house.rooms if kinds.count(r.kind) == 1}
+        self.looked_at = [r for r in dict.fromkeys(walk.rooms) if r in self.rooms]
+
+    def asked(self, kind: str, rng: np.random.Generator) -> WalkScene:
+        """The scene for somebody drawn who asks questions of a type."""
+        scene = copy.copy(self)
+        scene.kind, scene.rng, scene.by = kind, rng, speakers.draw_speaker(rng)
+        return scene
+
+    def ask(self, answer: str, about: Iterable[str], others: Any = (), fact: str = "", **slots: str) -> VqaQuestion:
+        """A question in words. `others` are wrong options, none for a number; `slots` fill the template."""
+        templates = [*ASKING[self.kind][""], *ASKING[self.kind].get(self.by.habit, ())]
+        text = templates[int(self.rng.integers(len(templates)))].format(**slots)
+        options = tuple(self.shuffled([answer, *others])) if others else ()
+        text, about = text[0].upper() + text[1:], tuple(about)
+        return VqaQuestion("", self.walk.name, self.kind, text, answer, options, about, fact)
+
+    def shuffled(self, items: Sequence) -> list:
+        return [items[i] for i in self.rng.permutation(len(items))]
+
+    def in_room(self, room: str) -> list[Placement]:
+        return [p for p in self.things if p.room == room]
+
+    def room_name(self, room: str) -> str:
+        """'kitchen', 'master bedroom'."""
+        nouns = ROOM_NOUNS[self.rooms[room]]
+        return nouns[0 if self.rng.random() < self.by.plainness else int(self.rng.integers(len(nouns)))]
+
+    def noun(self, name: str) -> str:
+        """A noun for a class that stands for no other class, most often its own name."""
+        nouns = [n for n in self.lexicon.nouns_of[name] if self.lexicon.classes_of[n] == (name,) and plural(n) != n]
+        return name if not nouns or self.rng.random() < 0.6 else nouns[int(self.rng.integers(len(nouns)))]
+
+    def called(self, noun: str) -> list[Placement]:
+        """All of the house that somebody may take for what a noun means."""
+        return [p for p in self.house.placements if self._says(p, self.lexicon.thing(Word(noun, ())))]
+
+    def _says(self, p: Placement, thing: Referent) -> bool:
+        alike = (c for name in thing.classes for c in ALIKE.get(name, ()))
+        return says(self.assets[p.id], Referent((*thing.classes, *alike), thing.words))
+
+    def named(self, things: Sequence[Placement]) -> list[tuple[Placement, str]]:
+        """Things in a drawn order, with names that fit them alone; without those that have none."""
+        return [(p, name) for p in self.shuffled(things) if (name := self.name(p))]
+
+    def name(self, p: Placement) -> str | None:
+        """'the red armchair', 'the bed in the guest room': words that a reader takes for this thing alone."""
+        for adjectives in (int(self.rng.random() < self.by.colours), 1, 2):
+            word = self.lexicon.words_for(self.assets[p.id], self.rng, adjectives=adjectives)
+            if self.rng.random() < self.by.plainness or with_article(word.noun).startswith("some "):
+                word = Word(p.object_class, tuple(w for w in word.adjectives if w not in p.object_class.split()))
+            meant = self.meant(str(word))
+            if with_article(word.noun).startswith("some "):
+                return None  # plural in form: no question agrees with it
+            if meant == [p]:
+                return f"the {word}"
+            if p.room in self.rooms and [q for q in meant if q.room == p.room] == [p]:
+                return f"the {word} in the {self.room_name(p.room)}"
+        return None
+
+    def meant(self, words: str) -> list[Placement]:
+        """Placements that a reader takes words for, of all that the walk shows."""
+        thing = self.lexicon.heard(words.split())
+        return [q for q in self.house.placements if q.id in self.glimpsed and thing and self._says(q, thing)]
+
+
+def _firsts(frames: Iterable[Iterable[str]]) -> dict[str, int]:
+    first: dict[str, int] = {}
+    for k, owners in enumerate(frames):
+        first = {**dict.fromkeys(owners, k), **first}
+    return first
+
+
+def apart(a: Placement, b: Placement) -> float:
+    """Metres between the nearest points of two boxes."""
+    low, high = sorted((a, b), key=lambda p: p.position[2])
+    return math.hypot(footprint(a).distance(footprint(b)), max(high.position[2] - low.position[2] - low.size[2], 0.0))
+
+
+def middle(p: Placement) -> np.ndarray:
+    """(2,) metres, seen from above."""
+    return np.array(p.position[:2])
+
+
+def direction(here: np.ndarray, there: np.ndarray) -> float:
+    """Radians."""
+    return math.atan2(*(there - here)[1::-1])
+
+
+def bearing(here: np.ndarray, ahead: float, there: np.ndarray) -> float:
+    """Degrees to the left of `ahead` (radians) in which `there` lies from `here`, -180 to 180."""
+    return math.degrees(wrap(direction(here, there) - ahead))

@@ -1,0 +1,114 @@
+"""Walks through a house for questions about it: where the camera goes, and how much of what each frame shows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import shapely
+
+from embodied.assets.cache import write_bytes
+from embodied.geometry import rectangle, wrap
+from embodied.house.house import House, Placement
+from embodied.navigation.graph import NavGraph
+from embodied.render.camera import camera_at
+from embodied.world import World
+
+LENS = math.radians(-12), math.radians(60), (360, 480)
+"""Tilt and vertical field of view, radians; height and width of a frame, pixels."""
+STRIDE, TURN = 0.7, math.radians(30)
+"""Most metres and radians between two frames."""
+CLEAR_SHARE, LARGE, WHOLE, GLIMPSE = 0.004, 0.04, 0.25, 0.0003
+"""An object counts as seen if some frame gives it CLEAR_SHARE of its pixels and does not cut it off (or LARGE of them),
+and at least WHOLE of the outline of its box shows it. With less than GLIMPSE in all frames it counts as unseen. No
+question is about what lies between."""
+Camera = tuple[np.ndarray, float]
+"""(3,) position, metres, and yaw, radians."""
+
+
+@dataclass(frozen=True)
+class WalkFrame:
+    """One picture: `shares` of its pixels by placement; `clear` are those that count as seen."""
+
+    position: tuple[float, float, float]
+    yaw: float
+    shares: Mapping[str, float]
+    clear: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Walk:
+    """walk.json: a walk through `rooms`, with a look around in each."""
+
+    name: str
+    house: str
+    rooms: tuple[str, ...]
+    frames: tuple[WalkFrame, ...]
+
+
+def tour(house: House, graph: NavGraph, rooms: int, *, rng: np.random.Generator) -> tuple[list[int], list[int]]:
+    """Nodes of a walk from a drawn room into up to so many rooms, the nearest first, and those to look around at."""
+    middles: dict[str, int] = {}
+    for room in sorted({*graph.room_of_node}):
+        walls = shapely.Polygon(house.room_by_id[room].polygon).exterior
+        nodes = [n for n, r in enumerate(graph.room_of_node) if r == room]
+        middles[room] = max(nodes, key=lambda n: walls.distance(shapely.Point(graph.positions[n, :2])))
+    path = [middles[sorted(middles)[int(rng.integers(len(middles)))]]]
+    stops = [path[0]]
+    while left := sorted({*middles} - {graph.room_of_node[n] for n in stops}) if len(stops) < rooms else ():
+        room = min(left, key=lambda r: graph.distance[path[-1], middles[r]] + rng.uniform(0, 2))
+        path += graph.path(path[-1], middles[room])[1:]
+        stops.append(path[-1])
+    return path, stops
+
+
+def cameras(graph: NavGraph, path: Sequence[int], stops: Sequence[int], yaw: float) -> Iterator[Camera]:
+    """The cameras of a walk that begins with a look along `yaw`; it looks all around at each stop."""
+    todo, here = list(stops), graph.positions[path[0]]
+    for k, node in enumerate(path):
+        there = graph.positions[node]
+        if k:
+            ahead = math.atan2(*(there - here)[1::-1])
+            turns = math.ceil(abs(float(wrap(ahead - yaw))) / TURN)
+            yield from ((here, float(wrap(yaw + wrap(ahead - yaw) * i / turns))) for i in range(1, turns))
+            steps, yaw = math.ceil(float(np.linalg.norm(there - here)) / STRIDE), ahead
+            yield from ((here + (there - here) * i / steps, yaw) for i in range(1, steps))
+        here, looks = there, round(2 * math.pi / TURN) if node in todo[:1] else 1
+        todo = todo[looks > 1 :]
+        yield from ((here, float(wrap(yaw + i * TURN))) for i in range(looks))
+
+
+def film(world: World, track: Sequence[Camera], folder: Path) -> Iterator[WalkFrame]:
+    """Draw the frames of a walk into `folder`: NNN.jpg, and NNN.png with instance ids of 16 bits."""
+    things = world.house.placement_by_id
+    for k, (position, yaw) in enumerate(track):
+        view = world.camera(position, yaw, *LENS)
+        for name, picture in ((f"{k:03d}.jpg", view.rgb[..., ::-1]), (f"{k:03d}.png", view.ids.astype(np.uint16))):
+            write_bytes(folder / name, cv2.imencode(name[-4:], picture, [cv2.IMWRITE_JPEG_QUALITY, 88])[1].tobytes())
+        shares = shares_of(world, view.ids)
+        cut = {world.owners[i - 1] for side in (0, -1) for i in {*view.ids[side], *view.ids[:, side]} if i}
+        large = [o for o, share in shares.items() if share >= LARGE or (share >= CLEAR_SHARE and o not in cut)]
+        clear = (o for o in large if shares[o] >= WHOLE * outline(things[o], position, yaw))
+        x, y, z = (round(float(c), 3) for c in position)
+        yield WalkFrame((x, y, z), round(yaw, 4), shares, tuple(sorted(clear)))
+
+
+def shares_of(world: World, ids: np.ndarray) -> dict[str, float]:
+    """Placements to their shares of a picture of instance ids."""
+    counts = np.bincount(ids.ravel(), minlength=len(world.house.placements) + 1)[1 : len(world.house.placements) + 1]
+    return {world.owners[i]: round(float(counts[i]) / ids.size, 5) for i in np.flatnonzero(counts)}
+
+
+def outline(p: Placement, position: Sequence[float] | np.ndarray, yaw: float) -> float:
+    """Share of a frame inside the outline of a thing's box; 0 where it reaches behind the camera."""
+    (pitch, vfov, (height, width)), flat = LENS, rectangle(*p.position[:2], *p.size[:2], p.yaw)
+    camera = camera_at(position, yaw, pitch, vfov)
+    corners = np.array([[x, y, p.position[2] + z] for x, y in flat for z in (0.0, p.size[2])]) - camera.position
+    if (along := corners @ camera.forward).min() < 0.05:
+        return 0.0
+    plane = np.stack([corners @ camera.right * height / width, corners @ camera.up]) / along / math.tan(vfov / 2)
+    return float(cv2.contourArea(cv2.convexHull(np.clip(plane.T, -1, 1).astype(np.float32)))) / 4

@@ -1,0 +1,139 @@
+"""Questions about houses: answers are what the house says, words fit one thing only, and no blind model gets far."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+
+import cv2
+import numpy as np
+import pytest
+from conftest import two_rooms
+
+from embodied.assets.catalogue import load_catalogue
+from embodied.cli import main
+from embodied.datasets.vqa.build import VqaData, asked_about
+from embodied.datasets.vqa.scene import WalkScene
+from embodied.datasets.vqa.scoring import BLIND, VqaQuestion, accuracy, chance, cross_judged, thinned
+from embodied.datasets.vqa.types import TYPES
+from embodied.datasets.vqa.walks import CLEAR_SHARE, Walk, WalkFrame
+from embodied.house.house import House, Placement
+from embodied.language.lexicon import ROOM_NOUNS
+from embodied.language.plain_language import plural
+from embodied.navigation.graph import build_graph
+
+THINGS = {
+    "sofa": (1, 3),
+    "armchair": (4.3, 3.3),
+    "bookcase": (4.6, 0.3),
+    "bed": (7.5, 3),
+    "desk": (8, 0.6),
+    "stool": (3, 1),
+}
+
+
+def scene(clear=None, second_sofa=False) -> WalkScene:
+    """A walk through the two rooms that shows all of their things, clearly or some of them not."""
+    catalogue, house = load_catalogue(None), two_rooms()
+    spots = [(f"{name}_1", at) for name, at in THINGS.items()] + [("sofa_2", (6, 1))] * second_sofa
+    for name, (x, y) in spots:
+        asset = catalogue.of_class(name[:-2])[0]
+        room = "living_room_1" if x < 5 else "bedroom_1"
+        p = Placement(name, asset.key, name[:-2], room, (float(x), float(y), 0.0), 0.0, asset.size)
+        house = dataclasses.replace(house, placements=(*house.placements, p))
+    ids = [p.id for p in house.placements]
+    frame = WalkFrame((2.5, 2.0, 1.5), 0.0, dict.fromkeys(ids, 0.02), tuple(ids if clear is None else clear))
+    walk = Walk("hand_0000_0", "hand_0000", ("living_room_1", "bedroom_1"), (frame,) * 3)
+    return WalkScene(walk, house, build_graph(two_rooms()), catalogue)
+
+
+@pytest.fixture(scope="module")
+def hand() -> tuple[WalkScene, list[VqaQuestion]]:
+    s = scene()
+    return s, asked_about(s, 60, seed=0)
+
+
+def test_answers_follow_from_where_things_are(hand):
+    s, questions = hand
+    place, kinds = s.house.placement_by_id, {q.type for q in questions}
+    assert {"object_abs_distance", "object_rel_direction_easy", "object_size_estimation"} <= kinds
+    for q in questions:
+        spots = [np.array(place[i].position[:2]) for i in q.about if i in place]
+        if q.type.startswith("object_rel_direction"):
+            (a, b), c = (spots[1] - spots[0]), spots[2] - spots[0]
+            left = a * c[1] - b * c[0] > 0
+            assert (("left" in q.answer) == left) or q.answer == "back"
+        elif q.type == "object_abs_distance":
+            middles = math.dist(*spots)
+            assert float(q.answer) < middles <= float(q.answer) + 3.2
+        elif q.type == "object_size_estimation":
+            assert int(q.answer) == round(100 * max(place[q.about[0]].size))
+        elif q.type == "room_size_estimation":
+            assert float(q.answer) == pytest.approx({"living_room_1": 18.9, "bedroom_1": 15.1}[q.about[0]], abs=0.1)
+
+
+def test_no_question_is_about_what_is_only_glimpsed():
+    clear = [f"{name}_1" for name in THINGS if name != "sofa"]
+    questions = asked_about(scene(clear=clear), 60, seed=0)
+    assert questions and not any("sofa_1" in q.about for q in questions)
+
+
+def test_a_name_means_one_thing_to_who_reads_it(hand):
+    s = hand[0].asked("support", np.random.default_rng(0))
+    sofa = s.house.placement_by_id["sofa_1"]
+    assert s.meant(s.name(sofa).removeprefix("the ")) == [sofa]
+    both = scene(second_sofa=True).asked("support", np.random.default_rng(0))
+    rooms = {both.name(both.house.placement_by_id[i]).rpartition(" in the ")[2] for i in ("sofa_1", "sofa_2")}
+    assert len(rooms) == 2 and rooms <= {*ROOM_NOUNS["living_room"], *ROOM_NOUNS["bedroom"]}
+
+
+def test_the_same_seed_asks_the_same(hand):
+    assert asked_about(scene(), 60, seed=0) == hand[1] != asked_about(scene(), 60, seed=1)
+
+
+def test_numbers_are_scored_as_by_vsi_bench():
+    assert accuracy(np.array([2.0, 1.5, 9.0]), np.full(3, 2.0)).tolist() == pytest.approx([1, 0.6, 0])
+    assert chance([VqaQuestion("c", "w", "support", "What?", "mug", ("cup", "mug"))]) == 0.5
+
+
+def test_questions_that_can_be_guessed_are_thinned_until_they_cannot():
+    rng, nouns = np.random.default_rng(0), ["bed", "mug", "sofa", "lamp", "vase", "desk", "rug", "stool"]
+
+    def asked(guessable: float) -> list[VqaQuestion]:
+        out = []
+        for k in range(400):
+            options = [str(o) for o in rng.permutation(nouns)[:4]]
+            right = "bed" if "bed" in options and rng.random() < guessable else options[rng.integers(4)]
+            out.append(VqaQuestion(str(k), "w", "support", "What is there?", right, tuple(options)))
+        return out
+
+    assert max(cross_judged(m, asked(0.9), 5)[0].mean() for m in BLIND) > 0.4
+    left = thinned(asked(0.9), 0)
+    assert 50 < len(left) < 380 and max(cross_judged(m, left, 5)[0].mean() for m in BLIND) < 0.33
+    assert len(thinned(asked(0.0), 0)) > 300
+
+
+def test_plurals():
+    nouns = ["mug", "box", "peace lily", "toy", "bookshelf", "row of books", "knife", "woman", "slippers", "laundry"]
+    plurals = ["mugs", "boxes", "peace lilies", "toys", "bookshelves", "rows of books", "knives", "women", "slippers"]
+    assert [plural(n) for n in nouns] == [*plurals, "laundry"]
+
+
+@pytest.mark.gl
+@pytest.mark.slow
+def test_the_command_makes_questions_about_what_the_frames_show(tmp_path, capsys):
+    data = str(tmp_path / "vqa")
+    small = ["--houses", "1", "--test-houses", "1", "--area", "38", "46", "--seed", "3", "--workers", "1"]
+    assert main(["dataset", "vqa", "--out", data, *small, "--tasks", "60", "--pictures", "unlit"]) == 0
+    questions = VqaData(data).questions("test")
+    assert questions and {q.type for q in questions} <= {*TYPES}
+    home = tmp_path / "vqa/houses/test_0000"
+    q = next(q for q in questions if q.type == "object_abs_distance")
+    owner = 1 + [p.id for p in House.load(home / "house.json").placements].index(q.about[0])
+    frames = sorted((home / f"walk_{q.walk[-1]}").glob("*.png"))
+    assert max((cv2.imread(str(f), -1) == owner).mean() for f in frames) >= CLEAR_SHARE
+    capsys.readouterr()
+    assert main(["evaluate", "vqa", "--data", data, "--json"]) == 0
+    table = json.loads(capsys.readouterr().out)
+    assert set(table["scores"]) == {"chance", *BLIND} and table["types"] == [*dict.fromkeys(q.type for q in questions)]
