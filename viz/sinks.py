@@ -17,7 +17,7 @@ from embodied.errors import UnableError
 
 APPLICATION = "embodied"
 PORT = 9876
-"""Where Rerun's viewers and servers listen for recordings."""
+"""Rerun's own, on which viewers and servers listen."""
 
 LOCAL = f"rerun+http://127.0.0.1:{PORT}/proxy"
 """A viewer on this machine."""
