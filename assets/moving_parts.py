@@ -109,8 +109,12 @@ class TakenApart:
 
     def label_at(self, points: np.ndarray, openness: Mapping[str, float]) -> np.ndarray:
         """(k,) labels of the faces of the thing, open so far, whose middles are nearest to points (k, 3)."""
-        label = np.concatenate(self.labels)
-        middles = np.concatenate([p.vertices[p.faces].mean(1) for p in self.closed])
+        groups: list[tuple[MeshPart, np.ndarray | int]] = list(zip(self.closed, self.labels, strict=True))
+        if openness:  # what is closed does not show
+            groups = [*((p, FIXED) for p in self.fixed), *((p, WITHIN) for p in self.within)]
+            groups += [(p, k) for k, m in enumerate(self.moving) for p in self.parts[m.name]]
+        label = np.concatenate([np.broadcast_to(of, len(p.faces)) for p, of in groups])
+        middles = np.concatenate([p.vertices[p.faces].mean(1) for p, _ in groups])
         for k, m in enumerate(self.moving):
             turn, shift = m.turn(openness.get(m.name, 0.0))
             middles[label == k] = middles[label == k] @ turn.T + shift

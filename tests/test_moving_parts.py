@@ -99,6 +99,16 @@ def test_a_drawer_comes_out_straight_and_a_door_ends_at_a_right_angle_within_its
     assert shift[1] == pytest.approx(-drawer.reach / 2) and 0.3 < drawer.reach < 0.6
 
 
+def test_what_was_open_when_the_house_was_lit_is_known_again():
+    p = HOUSE.placement_by_id["drawer_cabinet_1"]
+    thing = apart(CATALOGUE.mesh, p)
+    seen = CATALOGUE.mesh(p.asset, p.size, (("open/drawer_2", 0.6),))
+    middles = np.concatenate([m.vertices[m.faces].mean(1) for m in seen])
+    label = thing.label_at(middles, {"drawer_2": 0.6})
+    for k, m in enumerate(thing.moving):
+        assert (label == k).sum() == sum(len(x.faces) for x in thing.parts[m.name])
+
+
 def test_an_open_house_survives_json_and_names_what_it_does_not_have():
     opened = Moment(openness={"fridge_1/door_2": 0.4}).applied(HOUSE)
     assert House.from_json(opened.to_json()) == opened and opened.digest != HOUSE.digest

@@ -108,6 +108,8 @@ def parts_of(case: Case, *, hidden: bool = False) -> Iterator[tuple[Part, Hung]]
     shown = {"": whole.within if hidden else (*whole.fixed, *whole.within)}
     for k, m in enumerate(whole.moving):
         seen = sum(bool((of == k).any()) for of in whole.labels)
+        if hidden and m.name in openness_of(p.params):
+            continue
         backs = [dataclasses.replace(x, faces=x.faces[_looks_back(x)]) for x in whole.parts[m.name][:seen]]
         shown[m.name] = (
             (*(x for x in backs if len(x.faces)), *whole.parts[m.name][seen:]) if hidden else whole.parts[m.name]
@@ -138,7 +140,8 @@ def lit_parts(m: LitMesh, case: Case) -> Iterator[tuple[LitMesh, Hung]]:
         back, shift = part.turn(openness_of(p.params).get(part.name, 0.0))
         vertices = ((still.vertices - shift) @ back).astype(np.float32)
         closed = dataclasses.replace(still, vertices=vertices, faces=m.faces[label == k])
-        yield dataclasses.replace(closed, faces=closed.faces[~_looks_back(closed)]), case.bodies[part.name]
+        dark = _looks_back(closed) & (part.name not in openness_of(p.params))
+        yield dataclasses.replace(closed, faces=closed.faces[~dark]), case.bodies[part.name]
 
 
 def _looks_back(m: MeshPart | LitMesh) -> np.ndarray:
