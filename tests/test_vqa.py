@@ -10,12 +10,13 @@ import cv2
 import numpy as np
 import pytest
 from conftest import two_rooms
+from hand_chat import ChatServer, first_allowed
 
 from embodied.assets.catalogue import load_catalogue
 from embodied.cli import main
 from embodied.datasets.vqa.build import VqaData, asked_about
 from embodied.datasets.vqa.scene import WalkScene
-from embodied.datasets.vqa.scoring import BLIND, VqaQuestion, accuracy, chance, cross_judged, thinned
+from embodied.datasets.vqa.scoring import BLIND, VqaQuestion, accuracy, chance, cross_judged, score, thinned
 from embodied.datasets.vqa.types import TYPES
 from embodied.datasets.vqa.walks import CLEAR_SHARE, Walk, WalkFrame
 from embodied.house.house import House, Placement
@@ -94,6 +95,8 @@ def test_the_same_seed_asks_the_same(hand):
 
 def test_numbers_are_scored_as_by_vsi_bench():
     assert accuracy(np.array([2.0, 1.5, 9.0]), np.full(3, 2.0)).tolist() == pytest.approx([1, 0.6, 0])
+    choice = VqaQuestion("c", "w", "support", "What?", "mug", ("cup", "mug"))
+    assert score(choice, "B.") == 1 and score(choice, "A") == 0 and "A. cup\nB. mug" in choice.prompt
     assert chance([VqaQuestion("c", "w", "support", "What?", "mug", ("cup", "mug"))]) == 0.5
 
 
@@ -133,7 +136,17 @@ def test_the_command_makes_questions_about_what_the_frames_show(tmp_path, capsys
     owner = 1 + [p.id for p in House.load(home / "house.json").placements].index(q.about[0])
     frames = sorted((home / f"walk_{q.walk[-1]}").glob("*.png"))
     assert max((cv2.imread(str(f), -1) == owner).mean() for f in frames) >= CLEAR_SHARE
+    llm = ["evaluate", "vqa", "--data", data, "--agent", "llm", "blind", "--model", "m", "--frames", "2", "--json"]
+    llm += ["--answers", str(tmp_path / "answers.sqlite")]
+    with ChatServer(first_allowed) as server:
+        assert main([*llm, "--base-url", server.url]) == 0
+        content = server.requests[0]["messages"][1]["content"]
+        assert [part["type"] for part in content] == ["text", "image_url", "image_url"]
     capsys.readouterr()
-    assert main(["evaluate", "vqa", "--data", data, "--json"]) == 0
+    assert main([*llm, "--offline"]) == 0
     table = json.loads(capsys.readouterr().out)
-    assert set(table["scores"]) == {"chance", *BLIND} and table["types"] == [*dict.fromkeys(q.type for q in questions)]
+    nearest = [q.letter == "A" for q in questions if q.type == "object_rel_distance"]  # whoever always says A
+    assert table["scores"]["llm"][table["types"].index("object_rel_distance")] == pytest.approx(np.mean(nearest))
+    assert {*table["scores"]} == {"chance", "llm", *BLIND} and table["types"] == [
+        *dict.fromkeys(q.type for q in questions)
+    ]

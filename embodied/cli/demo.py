@@ -57,7 +57,8 @@ def run(args: DemoOptions) -> None:
     if args.small:
         show_a_room(args)
     else:
-        demonstrate(args, viewers_of(args))
+        with viewers_of(args) as viewers:
+            demonstrate(args, viewers)
 
 
 def demonstrate(args: DemoOptions, viewers: tuple[str, ...]) -> None:
@@ -88,7 +89,7 @@ def demonstrate(args: DemoOptions, viewers: tuple[str, ...]) -> None:
             film_a_door(args.out / "door.mp4", world)
         facts: dict[str, object] = {"walk": walk, "help": help_facts, "plan": str(args.out / "plan.png")}
         facts |= {"seconds": seconds, "renderer": world.fingerprint["renderer"]}
-    look = f"look at a recording with: rerun {help_facts['recording']}"
+    look = f"look at a recording with: embodied view {help_facts['recording']}"
     show(args, facts, "\n".join([told(walk), told(help_facts), f"floor plan  {facts['plan']}", look]))
 
 

@@ -7,7 +7,7 @@
     embodied evaluate hanna --data DATA --agent my_module:Policy my_learner:LEARNER=RUN
     embodied evaluate ask --seed-file FILE --agent submissions/team_7
     embodied evaluate my_task:KIND --data DATA
-    embodied evaluate vqa --data DATA
+    embodied evaluate vqa --data DATA --agent blind llm --model NAME --base-url URL
 
 The command prints a table with 95 % confidence intervals. With --out it also writes the table as Markdown and
 JSON, and all episodes, which `embodied view` shows. Every answer of a language model is kept in --answers, so that the
@@ -117,7 +117,9 @@ class EvaluateOptions(TaskOptions, Results, OfTrained, WithModel, Encoded, Threa
     threads: Count = 2
     sees: Annotated[str, Option(words=MODEL_SEES)] = "names"
     """Input of a language model: the true names of what is visible (an oracle), the candidate views as one strip,
-    the panorama with markers, or nothing."""
+    the panorama with markers, or nothing. vqa: nothing, or else frames."""
+    frames: Count = 8
+    """vqa: frames of a walk that a language model is shown."""
 
 
 @dataclass(frozen=True, eq=False)

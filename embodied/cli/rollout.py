@@ -44,7 +44,8 @@ class RolloutOptions(Filmed, Viewers, Furnished, Printed):
 
 def run(args: RolloutOptions) -> None:
     check_machine("unlit" if args.house else args.pictures)  # a house may be lit already
-    roll_out(args, viewers_of(args))
+    with viewers_of(args) as viewers:
+        roll_out(args, viewers)
 
 
 def roll_out(args: RolloutOptions, viewers: tuple[str, ...]) -> None:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import base64
+import itertools
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from embodied.cli.common import check_machine, pause, show
+from embodied.cli.common import bar, check_machine, note, pause, show
 
 if TYPE_CHECKING:
     from embodied.cli.dataset import DatasetOptions
     from embodied.cli.evaluate import EvaluateOptions
+    from embodied.datasets.vqa.build import VqaData
+    from embodied.datasets.vqa.scoring import VqaQuestion
 
-VQA, DEFAULT_HOUSES, PER_HOUSE = "vqa", {"train": 40, "test": 10}, 200
-"""Houses of the splits, and questions of a house, unless options say otherwise."""
+VQA, DEFAULT_HOUSES, PER_HOUSE, TOGETHER = "vqa", {"train": 40, "test": 10}, 200, 32
+"""Houses of the splits, and questions of a house, unless options say otherwise; questions sent at a time."""
 
 
 def make(args: DatasetOptions) -> None:
@@ -41,19 +46,28 @@ def evaluate(args: EvaluateOptions) -> None:
     """`embodied evaluate vqa`: a row for every type, a column for every agent."""
     from embodied.assets.cache import write_bytes, write_json
     from embodied.datasets.vqa.build import VqaData
-    from embodied.datasets.vqa.scoring import BLIND, chance, cross_judged
+    from embodied.datasets.vqa.scoring import BLIND, chance, cross_judged, score
+    from embodied.records import save_lines
 
     if args.data is None:
         raise ValueError("questions need --data, a folder that `embodied dataset vqa` built")
-    if unknown := sorted({*args.agent} - {"blind"}):
-        raise ValueError(f"unknown agents {unknown}; questions are answered by blind (models that see nothing)")
+    if unknown := sorted({*args.agent} - {"llm", "blind"}):
+        raise ValueError(f"unknown agents {unknown}; questions are answered by llm and blind (models that see nothing)")
     data = VqaData(args.data)
     split = args.split[0] if args.split else [*data.about["counts"]][-1]
     questions = data.questions(split)
     questions = questions[:: -(-len(questions) // args.tasks)] if args.tasks else questions
     of = {t: [q for q in questions if q.type == t] for t in dict.fromkeys(q.type for q in questions)}
     columns = {"chance": [chance(qs) for qs in of.values()]}
-    columns |= {m: [float(cross_judged(m, qs, args.seed + 1)[0].mean()) for qs in of.values()] for m in BLIND}
+    if "blind" in (args.agent or ("blind",)):
+        columns |= {m: [float(cross_judged(m, qs, args.seed + 1)[0].mean()) for qs in of.values()] for m in BLIND}
+    if "llm" in args.agent:
+        answers = [*bar(answered(args, data, questions), "questions", "question", len(questions))]
+        scores = {q.id: score(q, answer) for q, answer in zip(questions, answers, strict=True)}
+        columns["llm"] = [sum(scores[q.id] for q in qs) / len(qs) for qs in of.values()]
+        if args.out:
+            records = ({"id": q.id, "said": a, "score": scores[q.id]} for q, a in zip(questions, answers))
+            save_lines(args.out / "answers.jsonl", records)
     rows = [(t, len(qs), values) for (t, qs), *values in zip(of.items(), *columns.values())]
     rows.append(("mean of types", len(questions), [sum(c) / len(c) for c in columns.values()]))
     table = f"| type | n | {' | '.join(columns)} |\n|---|{'---|' * (len(columns) + 1)}\n"
@@ -63,3 +77,23 @@ def evaluate(args: EvaluateOptions) -> None:
         write_bytes(args.out / "table.md", table.encode())
         write_json(args.out / "table.json", facts, indent=1)
     show(args, facts, table)
+
+
+def answered(args: EvaluateOptions, data: VqaData, questions: Sequence[VqaQuestion]) -> Iterator[str]:
+    """Answers of a language model, which is shown --frames frames; '' where its answer is none."""
+    from embodied.agents.language_models.client import client_of
+    from embodied.agents.language_models.completions import object_schema
+    from embodied.agents.language_models.prompts import read_prompt
+    from embodied.datasets.vqa.scoring import LETTERS
+
+    client, prompt, left = client_of(args), read_prompt("vqa", ("question",), args.prompts), iter(questions)
+    url = lambda file: "data:image/jpeg;base64," + base64.b64encode(file.read_bytes()).decode()
+    while group := [*itertools.islice(left, TOGETHER)]:
+        asked = []
+        for q in group:
+            frames = () if args.sees == "nothing" else tuple(map(url, data.frames(q.walk, args.frames)))
+            says = {"enum": [*LETTERS[: len(q.options)]]} if q.options else {"maxLength": 20}
+            schema = object_schema(answer={"type": "string", **says})
+            asked.append((prompt.messages(frames, question=q.prompt), schema))
+        yield from ("" if a.value is None else str(a.value["answer"]) for a in client.ask_all(asked))
+    note(f"{client.sent} requests were sent; all other answers were in {args.answers}")

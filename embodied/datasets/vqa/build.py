@@ -150,3 +150,9 @@ class VqaData:
         if split not in self.about["counts"]:
             raise DatasetError(f"unknown split {split!r}; {self.folder} has {list(self.about['counts'])}")
         return [*load_lines(self.folder / f"questions_{split}.jsonl", VqaQuestion)]
+
+    def frames(self, walk: str, most: int = 10**6) -> list[Path]:
+        """Pictures of a walk, at most so many, evenly spaced."""
+        house, _, number = walk.rpartition("_")
+        files = sorted((self.folder / "houses" / house / f"walk_{number}").glob("*.jpg"))
+        return [files[round(i)] for i in np.linspace(0, len(files) - 1, min(most, len(files)))]

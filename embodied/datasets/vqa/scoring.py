@@ -18,6 +18,7 @@ from scipy.sparse.linalg import lsqr
 
 from embodied.seeds import stream
 
+LETTERS = "ABCDE"
 NEAR_CHANCE, MOST_ALIKE, FEWEST_LEFT = 0.03, 1 / 2, 12
 """How far above chance a blind model may be; most questions of a type with one number; fewest of a type."""
 BLIND = ("majority", "prior", "classifier")
@@ -40,8 +41,29 @@ class VqaQuestion:
     about: tuple[str, ...] = ()
     fact: str = ""
 
+    @property
+    def letter(self) -> str:
+        """The letter of the right option, or the number."""
+        return LETTERS[self.options.index(self.answer)] if self.options else self.answer
+
+    @property
+    def prompt(self) -> str:
+        """The question with its options, and how to answer, as VSI-Bench has them."""
+        if not self.options:
+            return f"{self.text}\nPlease answer the question using a single word or phrase."
+        how = "Answer with the option's letter from the given choices directly."
+        return "\n".join([self.text, "Options:", *map(". ".join, zip(LETTERS, self.options)), how])
+
 
 Questions = Sequence[VqaQuestion]
+
+
+def score(question: VqaQuestion, answer: str) -> float:
+    """0 to 1: exact match of the letter, or mean relative accuracy of the number (Yang et al. 2025, sec. 3.3)."""
+    if question.options:
+        return float(answer.strip().split(" ")[0].rstrip(".,:)").lower() == question.letter.lower())
+    number = re.search(r"-?\d+(\.\d+)?", answer)
+    return float(accuracy(float(number[0]), np.array([float(question.answer)]))[0]) if number else 0.0
 
 
 def accuracy(answers: float | np.ndarray, true: np.ndarray) -> np.ndarray:
