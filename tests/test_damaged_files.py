@@ -6,10 +6,8 @@ nothing with a checksum may be. Small files that unpack to much, or nest deeply,
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import gzip
-import io
 import itertools
 import json
 import re
@@ -25,8 +23,6 @@ import cv2
 import deflate
 import numpy as np
 import pytest
-import rerun as rr
-import rerun.blueprint as rrb
 import simplejpeg
 import torch
 import trimesh
@@ -76,7 +72,6 @@ from embodied.scene import model
 from embodied.seeds import stream
 from embodied.serve.store import Event, Store
 from embodied.serve.study import load_study
-from embodied.viz.sinks import Sinks, check_recording, open_recording
 
 MUTATIONS = 36
 """Of each kind; together some 1,000."""
@@ -355,22 +350,6 @@ def sightings(folder: Path, data: Dataset) -> Kind:
 
     save_table(folder / "sightings.npz", sightings_table([(np.ones((6, 4, 4)), np.full((6, 4, 4), 2))], 3))
     return Kind(folder / "sightings.npz", read)
-
-
-@kind
-def recording(folder: Path, data: Dataset) -> Kind:
-    """Only what is no recording at all is refused; what is inside is the viewer's to read."""
-
-    def read(path: Path) -> object:
-        with contextlib.redirect_stderr(io.StringIO()) as warned:
-            check_recording(path)
-        if warned.getvalue():
-            raise ValueError(warned.getvalue())
-        return path.read_bytes()
-
-    with open_recording(Sinks(folder / "a.rrd"), rrb.Blueprint(), name="fuzz", properties={}) as recording:
-        recording.log("text", rr.TextDocument("a"))
-    return Kind(folder / "a.rrd", read, lenient=True)
 
 
 @kind

@@ -34,7 +34,6 @@ from embodied.records import RecordError, from_json, save_lines
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import Baked
 from embodied.seeds import stream
-from embodied.viz import sinks
 
 
 @pytest.fixture(scope="module")
@@ -239,24 +238,3 @@ def test_a_cache_that_cannot_be_written_is_named_with_what_to_do(capsys, tmp_pat
     assert cli.main(order) == 2 and "/proc/nowhere" in capsys.readouterr().err
     found = doctor.disk(argparse.Namespace(cache=Path("/proc/nowhere/cache")))
     assert not found.ok and found.needed and "cannot be written" in found.text and "EMBODIED_CACHE" in found.remedy
-
-
-def test_viewers_that_we_start_send_no_statistics():
-    config = [sinks.viewer_program(), "analytics", "config"]
-    said = subprocess.run(config, capture_output=True, text=True, env=sinks.viewer_environment(), timeout=600)
-    assert re.search(r'"analytics_enabled": false', said.stdout), said
-
-
-def test_a_recording_is_never_an_option_and_everybody_is_warned(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    Path("--version.rrd").write_bytes(b"RRF2" + bytes(40))
-    commands = []
-    monkeypatch.setattr(sinks, "_refuse_taken", lambda bind: None)
-    monkeypatch.setattr(sinks.subprocess, "run", lambda c, **_: commands.append(c) or subprocess.CompletedProcess(c, 0))
-    assert cli.main(["view", "./--version.rrd", "--serve", "--bind", "0.0.0.0"]) == 0
-    assert commands[0][1] == str(tmp_path / "--version.rrd")
-    said = capsys.readouterr().err
-    assert "everybody who reaches 0.0.0.0" in said and "was cut short or changed" in said
-    Path("a.rrd").write_bytes(b"GIF89a")
-    assert cli.main(["view", "a.rrd", "--serve"]) == 2
-    assert "is no recording of Rerun" in capsys.readouterr().err

@@ -6,11 +6,13 @@ import json
 import socket
 import subprocess
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 import rerun as rr
 import rerun.blueprint as rrb
+import rerun_cli
 
 from embodied import generate
 from embodied.agents.vision import detector, features
@@ -32,7 +34,7 @@ from embodied.tasks.find import find_pool, find_task
 from embodied.viz import house3d, recording
 from embodied.viz.blueprint import blueprint_of, sees_title
 from embodied.viz.recording import PictureSizes, camera_axes, record
-from embodied.viz.sinks import Sinks, listens, open_recording, open_viewers, viewer_program
+from embodied.viz.sinks import Sinks, checked_viewer, listens, open_recording
 from embodied.viz.video import camera_track, write_video
 from embodied.world import open_world
 
@@ -151,7 +153,7 @@ def test_what_is_sent_to_a_viewer_arrives(world, tmp_path):
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     viewer = subprocess.Popen(
-        [viewer_program(), "--save", str(saved), "--port", str(port)],
+        [str(Path(rerun_cli.__file__).with_name("rerun")), "--save", str(saved), "--port", str(port)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
@@ -159,11 +161,11 @@ def test_what_is_sent_to_a_viewer_arrives(world, tmp_path):
         until = time.monotonic() + 300
         while not listens("127.0.0.1", port) and time.monotonic() < until:
             time.sleep(0.1)
-        with open_viewers(connect=f"rerun+http://127.0.0.1:{port}/proxy") as viewers:
-            steps = [f.step for f in rollout(lambda: HelpEnv({world.name: world}), Shortest(), [task], seed=0)]
-            for _ in range(2):  # a second recording follows the first into the same viewer
-                with open_recording(Sinks(None, viewers), rrb.Blueprint(), name="sent", properties={}) as recording:
-                    list(record(recording, world, task, steps, pictures=PictureSizes((48, 64), 32)))
+        viewers = (checked_viewer(f"rerun+http://127.0.0.1:{port}/proxy"),)
+        steps = [f.step for f in rollout(lambda: HelpEnv({world.name: world}), Shortest(), [task], seed=0)]
+        for _ in range(2):  # a second recording follows the first into the same viewer
+            with open_recording(Sinks(None, viewers), rrb.Blueprint(), name="sent", properties={}) as recording:
+                list(record(recording, world, task, steps, pictures=PictureSizes((48, 64), 32)))
 
         def held() -> int:
             return saved.read_bytes().count(b"RecordingInfo:name") if saved.exists() else 0

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 import importlib
 import math
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from conftest import two_rooms
-from gymnasium.utils.seeding import np_random
 from handmade import HandCatalogue, decibels, furnished, of_panes, smooth_pages
 
 from embodied.errors import UnableError
-from embodied.gym.driving import DriveSettings, Driving
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
 from embodied.scene.house_meshes import owners
@@ -131,36 +127,3 @@ def test_a_batch_larger_than_the_renderer_is_refused(warped):
         warped.views([EYE] * 7, [0.0] * 7)
     with pytest.raises(ValueError, match="sound"):
         warped.views([EYE], [0.0], sees=("sound",))
-
-
-@pytest.mark.slow
-@pytest.mark.gl
-def test_bodies_of_a_batch_drive_and_see_as_each_alone_does(house, lit, classic, device):
-    torch = pytest.importorskip("torch")
-    from embodied.gym.drive_vector import DriveVectorEnv
-
-    world = SimpleNamespace(name="house", house=house, catalogue=HandCatalogue(), lit=lit)
-    settings = DriveSettings(height=SIZE, width=SIZE, farthest=5.0, seconds=0.4)
-    envs = DriveVectorEnv(world, settings, 2, device=device, out=torch.from_dlpack)
-    seen, _ = envs.reset(seed=3)
-    assert {name: x.cpu().numpy() for name, x in seen.items()} in envs.observation_space
-    alone = [Driving({"house": world}, dataclasses.replace(settings, observations=())) for _ in range(2)]
-    for i, driving in enumerate(alone):
-        driving.reset(np_random(3 + i)[0])
-    actions = torch.tensor([[1.0, 0.2], [-0.6, 1.0]])
-    for k in range(4):
-        seen, rewards, terminated, truncated, info = envs.step(actions)
-        outcomes = [d.step(a) for d, a in zip(alone, actions.numpy(), strict=True)]
-        for i, (driving, outcome) in enumerate(zip(alone, outcomes, strict=True)):
-            batched = envs.drivers[i]
-            assert np.allclose(batched.position, driving.driver.position, atol=0.01), (k, i)
-            assert abs(batched.yaw - driving.driver.yaw) < 0.02 and info["metres"][i] > 0
-            assert float(rewards[i]) == pytest.approx(outcome.reward, abs=0.01)
-            shot = classic.through(driving.camera(), (SIZE, SIZE))
-            assert decibels(shot.rgb, seen["rgb"][i].cpu().numpy()) > 20 and seen["depth"].dtype == torch.float32
-            assert np.median(np.abs(shot.depth - seen["depth"][i].cpu().numpy())) < 0.05
-    assert truncated.all() and not terminated.any()
-    _, rewards, _, truncated, _ = envs.step(actions)
-    assert not truncated.any() and not rewards.any(), "what has ended begins anew"
-    assert not np.allclose(envs.drivers[0].position, alone[0].driver.position, atol=0.01)
-    envs.close()

@@ -34,8 +34,8 @@ def load_run(folder: Path) -> list[Listed]:
     files = sorted(folder.glob("episodes*.jsonl"))
     if not files:
         raise FileNotFoundError(
-            f"{folder} holds no episodes*.jsonl; make a run with `embodied evaluate --out {folder}`, or name a .rrd "
-            "file"
+            f"{folder} holds no episodes*.jsonl; make a run with `embodied evaluate --out {folder}`; `rerun FILE.rrd` "
+            "opens recordings"
         )
     episodes = []
     for path in files:

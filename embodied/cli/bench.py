@@ -4,7 +4,6 @@
   seen                      steps with pixels
   drive                     live pictures, and the steps of a body on wheels that sees them
   bakes                     light a flat repeatedly
-  light                     compare the ways of rendering with a path tracer
   moving                    compare what moves with a path tracer, and what a frame costs then; takes an hour, in pieces
 
 Close other programs first.
@@ -24,7 +23,7 @@ from embodied.render.pictures import DRAWN
 if TYPE_CHECKING:
     pass
 
-PARTS = ("houses", "pictures", "plays", "seen", "drive", "bakes", "light", "moving")
+PARTS = ("houses", "pictures", "plays", "seen", "drive", "bakes", "moving")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,12 +35,12 @@ class BenchOptions(Furnished, Printed):
     pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
     """How pictures, seen and drive draw the house."""
     out: OutputFolder = Path("out/bench")
-    """Folder for the files of light and moving."""
+    """Folder for the files of moving."""
 
 
 def run(args: BenchOptions) -> None:
     from embodied import gl
-    from embodied.bench import bakes, drive, episodes, light, seen, timing, world
+    from embodied.bench import bakes, drive, episodes, seen, timing, world
 
     parts = args.part or ["houses", "pictures", "plays"]
     if unknown := sorted(set(parts) - set(PARTS)):
@@ -68,9 +67,6 @@ def run(args: BenchOptions) -> None:
     facts["measures"] = [asdict(m) for m in measures]
     if measures:
         texts.append(timing.table(measures))
-    if "light" in parts:
-        facts["light"] = light.compare(catalogue, args.cache, args.out, seed=args.seed, progress=note)
-        texts.append(light.table(facts["light"]))
     if "moving" in parts:
         from embodied.bench import moving  # late: loads the path tracer and MuJoCo
 

@@ -57,8 +57,7 @@ def run(args: DemoOptions) -> None:
     if args.small:
         show_a_room(args)
     else:
-        with viewers_of(args) as viewers:
-            demonstrate(args, viewers)
+        demonstrate(args, viewers_of(args))
 
 
 def demonstrate(args: DemoOptions, viewers: tuple[str, ...]) -> None:
@@ -89,7 +88,7 @@ def demonstrate(args: DemoOptions, viewers: tuple[str, ...]) -> None:
             film_a_door(args.out / "door.mp4", world)
         facts: dict[str, object] = {"walk": walk, "help": help_facts, "plan": str(args.out / "plan.png")}
         facts |= {"seconds": seconds, "renderer": world.fingerprint["renderer"]}
-    look = f"look at a recording with: embodied view {help_facts['recording']}"
+    look = f"look at a recording with: rerun {help_facts['recording']}"
     show(args, facts, "\n".join([told(walk), told(help_facts), f"floor plan  {facts['plan']}", look]))
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -29,14 +27,9 @@ class Viewers:
 
     rrd: OutputRrd | None = None
     """Write the Rerun recording here."""
-    spawn: bool = False
-    """Open the Rerun viewer, which needs a screen, and watch live."""
     connect: Annotated[str | None, Option(metavar="URL")] = None
-    """Send to a running viewer, e.g. rerun+http://127.0.0.1:9876/proxy."""
-    serve: bool = False
-    """Serve the web viewer, watch in the browser, end with Ctrl-C."""
-    bind: Annotated[str, Option(metavar="ADDRESS")] = "127.0.0.1"
-    """Address on which --serve listens; the default is this machine only, 0.0.0.0 lets everybody look and write."""
+    """Send to a running viewer, which `rerun` or, for browsers, `rerun --serve-web` starts, e.g.
+    rerun+http://127.0.0.1:9876/proxy."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,22 +40,13 @@ class Filmed:
     """Height and width of the video in pixels, both even."""
 
 
-@contextlib.contextmanager
-def viewers_of(args: Viewers) -> Iterator[tuple[str, ...]]:
-    """The viewers that the options ask for; open them before the work begins. --serve goes on until Ctrl-C."""
-    if not (args.spawn or args.connect is not None or args.serve):
-        yield ()
-        return
-    from embodied import gl
-    from embodied.viz.sinks import open_viewers
+def viewers_of(args: Viewers) -> tuple[str, ...]:
+    """The viewers that the options name; ask before the work begins."""
+    if args.connect is None:
+        return ()
+    from embodied.viz.sinks import checked_viewer
 
-    with open_viewers(spawn=args.spawn, connect=args.connect, serve=args.serve, bind=args.bind) as viewers:
-        if args.spawn and gl.available() and gl.info().software:
-            note(
-                "this machine draws by software: the native viewer is slow, and fills memory with some drivers; "
-                "better --serve"
-            )
-        yield viewers
+    return (checked_viewer(args.connect),)
 
 
 def film(world: World, episode: Episode, path: Path, size: tuple[int, int], camera: PhotoCamera | None = None) -> Path:

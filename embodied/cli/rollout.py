@@ -44,8 +44,7 @@ class RolloutOptions(Filmed, Viewers, Furnished, Printed):
 
 def run(args: RolloutOptions) -> None:
     check_machine("unlit" if args.house else args.pictures)  # a house may be lit already
-    with viewers_of(args) as viewers:
-        roll_out(args, viewers)
+    roll_out(args, viewers_of(args))
 
 
 def roll_out(args: RolloutOptions, viewers: tuple[str, ...]) -> None:

@@ -1,8 +1,7 @@
-"""Look at a recording, or at the episodes of a run.
+"""Look at the episodes of a run.
 
-RUN is a .rrd file, which opens in the Rerun viewer, or a folder that `embodied evaluate` wrote. Of a folder, the
-command lists the episodes; --episode N with --data records one, and with --video films it. The recording shows what
-the agent saw.
+RUN is a folder that `embodied evaluate` wrote. The command lists its episodes; --episode N with --data records one, and
+with --video films it. The recording shows what the agent saw; `rerun FILE.rrd` opens it.
 """
 
 from __future__ import annotations
@@ -30,9 +29,9 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, kw_only=True)
 class ViewOptions(Filmed, Viewers, Furnished, Printed):
     folder: Annotated[Path, Option(any_path, "RUN", name="folder")]
-    """A .rrd file, or a folder with episodes*.jsonl."""
+    """A folder with episodes*.jsonl."""
     episode: Annotated[int | None, Option(whole(0), "N")] = None
-    """Record episode N of the list and open it."""
+    """Record episode N of the list."""
     data: InputFolder | None = None
     """The data set of the run, for --episode."""
     pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
@@ -42,9 +41,6 @@ class ViewOptions(Filmed, Viewers, Furnished, Printed):
 
 
 def run(args: ViewOptions) -> None:
-    if args.folder.suffix == ".rrd":
-        show_file(args)
-        return
     from embodied.viz.report import load_run, summary_line
 
     episodes = load_run(args.folder)
@@ -53,21 +49,6 @@ def run(args: ViewOptions) -> None:
     else:
         facts = [{"number": i, "task": e.episode.task.id, "agent": e.agent} for i, e in enumerate(episodes)]
         show(args, {"episodes": facts}, "\n".join(summary_line(i, e) for i, e in enumerate(episodes)))
-
-
-def show_file(args: ViewOptions) -> None:
-    """Open a .rrd file in a new viewer, in the browser or in a viewer that runs."""
-    if not args.folder.exists():
-        raise FileNotFoundError(
-            f"{args.folder} does not exist; make one with `embodied demo` or `embodied rollout --rrd`"
-        )
-    from embodied.viz.sinks import open_file, send_file
-
-    if args.connect is None:
-        open_file(args.folder, serve=args.serve, bind=args.bind)
-    else:
-        with viewers_of(args) as viewers:
-            send_file(args.folder, viewers)
 
 
 def record_one(args: ViewOptions, episodes: Sequence[Listed], number: int) -> None:
@@ -83,11 +64,11 @@ def record_one(args: ViewOptions, episodes: Sequence[Listed], number: int) -> No
         )
     episode = episodes[number].episode
     file = args.rrd or args.folder / "recordings" / f"{number}.rrd"
-    with viewers_of(args) as viewers:
-        video = (args.video, args.video_size) if args.video else None
-        sinks, catalogue, data = Sinks(file, viewers), catalogue_of(args), Dataset(args.data)
-        record_again(args.folder, data, episode, sinks, catalogue, args.cache, pictures=args.pictures, video=video)
-        show(args, {"recording": str(file)}, f"wrote {file}; open it with: embodied view {file}")
+    viewers = viewers_of(args)
+    video = (args.video, args.video_size) if args.video else None
+    sinks, catalogue, data = Sinks(file, viewers), catalogue_of(args), Dataset(args.data)
+    record_again(args.folder, data, episode, sinks, catalogue, args.cache, pictures=args.pictures, video=video)
+    show(args, {"recording": str(file)}, f"wrote {file}; open it with: rerun {file}")
 
 
 def record_again(

@@ -5,12 +5,11 @@ The house is its arena: the collision boxes of embodied.scene.model.
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -160,21 +159,6 @@ class Driver:
         collisions = sorted(t for t in now if time - self._last_touch.get(t, -math.inf) > APART)
         self._last_touch |= dict.fromkeys(now, time)
         return Roll(rolled.metres + metres, (*rolled.collisions, *collisions), rolled.touched or bool(now))
-
-    def take_over(self, qpos: np.ndarray, qvel: np.ndarray, seconds: float) -> None:
-        """Be in a state that was computed elsewhere, so many seconds after the last; `eye` follows `update_poses`."""
-        self.data.qpos[:], self.data.qvel[:] = qpos, qvel
-        self.data.time += seconds
-
-    def update_poses(self) -> None:
-        """Compute the poses of all parts from the state."""
-        mujoco.mj_kinematics(self.model, self.data)
-
-    def twin(self) -> Self:
-        """Another body in the same house; they do not meet."""
-        other = copy.copy(self)
-        other.data, other._last_touch = mujoco.MjData(self.model), {}
-        return other
 
     @property
     def eye(self) -> tuple[np.ndarray, np.ndarray]:

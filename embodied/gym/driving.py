@@ -140,24 +140,13 @@ class Outcome:
     """success, spl, collisions, metres, seconds and distance_to_goal, since the episode began."""
 
 
-def stage_of(world: World) -> tuple[Driver, FloorWays]:
-    """The physics and the floor of a world."""
-    return Driver(world.house, world.catalogue), FloorWays(world.house)
-
-
 class Driving:
     """Owns the physics and the pictures of some houses, and plays one episode at a time."""
 
-    def __init__(
-        self,
-        worlds: Mapping[str, World],
-        settings: DriveSettings,
-        stage_of: Callable[[World], tuple[Driver, FloorWays]] = stage_of,
-    ) -> None:
+    def __init__(self, worlds: Mapping[str, World], settings: DriveSettings) -> None:
         """
         Args:
           worlds: by House.name, lit or not; what draws them is opened when an episode plays there.
-          stage_of: makes the physics and the floor of a world.
 
         Raises:
           ValueError: no worlds.
@@ -165,7 +154,7 @@ class Driving:
         if not worlds:
             raise ValueError("there are no houses to drive in; choose another split")
         self.worlds, self.settings = dict(worlds), settings
-        self._names, self._stage_of = sorted(self.worlds), stage_of
+        self._names = sorted(self.worlds)
         self._stages: OrderedDict[str, tuple[Driver, FloorWays]] = OrderedDict()
         self.task = driven_task(settings.task)
 
@@ -179,7 +168,7 @@ class Driving:
         name = self._names[int(rng.integers(len(self._names)))] if world is None else world
         self.world = self.worlds[name]
         if name not in self._stages:
-            self._stages[name] = self._stage_of(self.world)
+            self._stages[name] = Driver(self.world.house, self.world.catalogue), FloorWays(self.world.house)
         self._stages.move_to_end(name)
         if len(self._stages) > KEPT:
             self.worlds[self._stages.popitem(last=False)[0]].close()
