@@ -37,14 +37,6 @@ def differences(before: Identity, now: Identity, may_change: Collection[str] = (
     return [f"{k} {old.get(k)!r} -> {new.get(k)!r}" for k in sorted({*old, *new}) if old.get(k) != new.get(k)]
 
 
-def made_by_this_code(identity: Identity) -> bool:
-    """True if the code that made a thing is the code that runs."""
-    try:
-        return bool(identity.get(MAKERS)) and code_digest(*identity[MAKERS]) == identity.get(CODE)
-    except (ModuleNotFoundError, TypeError):  # a maker that was renamed, or is none
-        return False
-
-
 def write_finished(path: Path, identity: Identity, body: Mapping[str, object]) -> None:
     """Write a finished thing with its identity, atomically."""
     write_json(Path(path), {"identity": identity, **body}, indent=1)

@@ -7,16 +7,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from embodied.identity import (
-    CODE,
-    differences,
-    finished,
-    identity_of,
-    key_of,
-    made_by_this_code,
-    read_finished,
-    write_finished,
-)
+from embodied.identity import CODE, differences, finished, identity_of, key_of, read_finished, write_finished
 from embodied.records import RecordError
 
 
@@ -46,10 +37,3 @@ def test_a_finished_thing_of_other_settings_data_or_code_is_not_believed(tmp_pat
     path.write_text('{"success": 0.5}')
     with pytest.raises(RecordError, match="judged.json has no identity"):
         finished(path, mine)
-
-
-def test_the_code_that_made_a_thing_is_known_again():
-    mine = identity_of("embodied.seeds")
-    assert made_by_this_code(mine)
-    for stale in ({}, {**mine, CODE: "other"}, {**mine, "makers": ["embodied.renamed"]}):
-        assert not made_by_this_code(stale)

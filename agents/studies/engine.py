@@ -29,19 +29,9 @@ from embodied.agents.studies.pages import draw, page
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.assets.cache import digest, write_bytes, write_json
 from embodied.evaluation.tables import Samples, in_percent, interval, less
-from embodied.identity import (
-    CODE,
-    MAKERS,
-    Identity,
-    finished,
-    identity_of,
-    key_of,
-    made_by_this_code,
-    read_finished,
-    write_finished,
-)
+from embodied.identity import CODE, MAKERS, Identity, finished, identity_of, key_of, read_finished, write_finished
 from embodied.locks import locked
-from embodied.records import from_plain, read_json
+from embodied.records import from_plain
 
 PRINTED = Path(__file__).parent / "data" / "printed.json"
 """Numbers of papers: table to row to column, in the table's own units."""
@@ -153,21 +143,6 @@ def refuse_unknown(names: Iterable[str], known: Iterable[str], what: str) -> Non
     there = list(known)
     if unknown := [n for n in names if n not in there]:
         raise ValueError(f"unknown {what} {unknown}; there are {there}")
-
-
-def check(folder: Path) -> list[str]:
-    """The worth of stored tables in a folder, and in folders of it: one line per table."""
-    lines = []
-    for path in sorted(Path(folder).rglob("*.json")):
-        body = read_json(path)
-        if not {"table", "rows", "columns", "identity"} <= set(body):
-            continue
-        identity = body["identity"] or {}
-        parts = ["judged", *(["trained"] if "trained" in identity else [])]  # a benchmark trains nothing
-        stale = [what for what in parts if not made_by_this_code(identity.get(what) or {})]
-        verdict = f"{' and '.join(stale)} by other code than this" if stale else "belongs to this code"
-        lines.append(f"{path}: {body['table']} {verdict}")
-    return lines
 
 
 # Runs --------------------------------------------------------------------------------------------

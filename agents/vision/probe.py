@@ -18,8 +18,6 @@ from torch import Tensor
 from embodied.agents.common.weights import seeded
 from embodied.agents.vision.encoder import Encoder
 from embodied.agents.vision.labels import HouseStrips, visible_in_views
-from embodied.agents.vision.strip import windows
-from embodied.datasets.store import Dataset
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +30,6 @@ class LabelledFeatures:
     """(n, 36, C) bool."""
     room: np.ndarray
     """(n,) int, room kind of each node."""
-    log_depth: np.ndarray
-    """(n, 36) float32, mean log distance in each view."""
-    house: np.ndarray
-    """(n,) int, which house."""
-    position: np.ndarray
-    """(n, 3) metres."""
 
 
 def average_precision(scores: np.ndarray, positive: np.ndarray) -> float:
@@ -58,8 +50,7 @@ def read(
 ) -> dict[str, Any]:
     """Scores of linear readers that were fitted on `train`, on `test`: 'AP', mean over classes of the average precision
     of 'is it visible in this view'; 'chance AP', that of a constant; 'room accuracy', share of nodes whose kind of room
-    is read from the mean of their views; 'depth R²', explained variance of the mean log distance of a view; 'place
-    AUC' (see `place_auc`); and 'AP by class', None for a class that no judged house shows."""
+    is read from the mean of their views; and 'AP by class', None for a class that no judged house shows."""
     d = train.features.shape[-1]
     x, y = (torch.from_numpy(s.features.reshape(-1, d)) for s in (train, test))
     mean, deviation = x.mean(0), x.std(0) + 1e-6
@@ -78,15 +69,10 @@ def read(
     )
     guessed = reader(pooled[1] / scale).argmax(1).numpy()
 
-    goal = torch.from_numpy(train.log_depth.reshape(-1, 1)).float()
-    depth = _fit(x, goal, F.mse_loss, seed, steps)(y).numpy()[:, 0]
-    true_depth = test.log_depth.reshape(-1)
     return {
         "AP": float(np.nanmean(ap)),
         "chance AP": float(truth[:, [c for c in known if truth[:, c].any()]].mean()),
         "room accuracy": float((guessed == test.room).mean()),
-        "depth R²": float(1 - ((depth - true_depth) ** 2).mean() / true_depth.var()),
-        "place AUC": place_auc(test),
         "AP by class": {name: None if math.isnan(x) else x for name, x in zip(classes, ap, strict=True)},
     }
 
@@ -108,26 +94,7 @@ def _fit(
     return lambda rows: reader(rows).detach()
 
 
-def place_auc(nodes: LabelledFeatures, near: float = 2.5) -> float:
-    """Probability that the target similarity (D.1, summed) of two nodes at most `near` metres apart is higher than that
-    of two nodes of the same house farther apart."""
-    close, far = [], []
-    for house in sorted(set(nodes.house.tolist())):
-        rows = np.flatnonzero(nodes.house == house)
-        unit = nodes.features[rows] / (np.linalg.norm(nodes.features[rows], axis=-1, keepdims=True) + 1e-6)
-        gap = np.linalg.norm(nodes.position[rows][:, None] - nodes.position[rows][None], axis=-1)
-        for i in range(len(rows)):
-            similar = np.einsum("vd,nwd->nvw", unit[i], unit).max(-1).mean(-1)  # delta of D.1, averaged
-            others = np.arange(len(rows)) != i
-            close.append(similar[others & (gap[i] <= near)])
-            far.append(similar[others & (gap[i] > near)])
-    ranks = np.searchsorted(np.sort(np.concatenate(far)), np.concatenate(close))
-    return float(ranks.mean() / sum(map(len, far)))
-
-
-def labelled(
-    data: Dataset, houses: Sequence[HouseStrips], encoder: Encoder, classes: Sequence[str]
-) -> LabelledFeatures:
+def labelled(houses: Sequence[HouseStrips], encoder: Encoder, classes: Sequence[str]) -> LabelledFeatures:
     """Features of houses and what a linear reader should read from them."""
     columns = [houses[0].classes.index(c) for c in classes]
     features = [encoder.encode_strips(h.rgb[i : i + 8]) for h in houses for i in range(0, len(h.rgb), 8)]
@@ -135,7 +102,4 @@ def labelled(
         np.concatenate(features),
         np.concatenate([visible_in_views(h.share[..., columns]) for h in houses]),
         np.concatenate([h.room for h in houses]).astype(np.int64),
-        np.concatenate([np.einsum("vrc,nrc->nv", windows(), h.log_depth.astype(np.float32)) for h in houses]),
-        np.concatenate([np.full(len(h.rgb), i) for i, h in enumerate(houses)]),
-        np.concatenate([data.place(h.name).graph.positions for h in houses]),
     )

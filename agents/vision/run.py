@@ -48,7 +48,7 @@ def train_vision(
         for kind in dict.fromkeys((source.picture_kind, *["fast"][: source.lit])):
             drawn = dataclasses.replace(source, picture_kind=kind)
             first, other = (
-                labelled(data, drawn.strips(houses, note), encoder, classes)
+                labelled(drawn.strips(houses, note), encoder, classes)
                 for houses in (names[: source.lit or None], unseen)
             )
             reading = read(first, other, classes, seed=config.seed)

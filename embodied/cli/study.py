@@ -2,37 +2,24 @@
 
     embodied study hanna 4.5 --data DATA --out STUDY --seeds 3
     embodied study my_learner:LEARNER --data DATA --out STUDY
-    embodied study check STUDY
 
-`embodied study LEARNER --help` lists the tables of a learner; `check` lists the stored tables that no longer match the
-code. Rows that tables share are trained once. Each table is written as JSON, Markdown and, for some, as a figure. Rerun
-an interrupted command to resume.
+`embodied study LEARNER --help` lists the tables of a learner. Rows that tables share are trained once. Each table is
+written as JSON, Markdown and, for some, as a figure. Rerun an interrupted command to resume.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from embodied.cli.common import note
 from embodied.cli.learners import learner_commands
-from embodied.options import Option, any_folder
-
-
-@dataclass(frozen=True, kw_only=True)
-class CheckOptions:
-    """List the stored tables that no longer match the code."""
-
-    folder: Annotated[Path, Option(any_folder, "STUDY", name="folder")]
-    """Folder of a study, or of stored tables such as docs/results/data."""
 
 
 def commands(words: Sequence[str]) -> Mapping[str, Any]:
-    """The commands of the learners that `words`, of the command line, name, and `check`; of all where none is named."""
-    return {**learner_commands("study", words, run_tables), "check": (CheckOptions, check)}
+    """The commands of the learners that `words`, of the command line, name; of all where none is named."""
+    return learner_commands("study", words, run_tables)
 
 
 def run_tables(study: Callable[[Any], Any], args: Any) -> None:
@@ -52,9 +39,3 @@ def run_tables(study: Callable[[Any], Any], args: Any) -> None:
     )
     for path in files.values():
         print(path.read_text(encoding="utf-8"))
-
-
-def check(args: CheckOptions) -> None:
-    from embodied.agents.studies.engine import check
-
-    print("\n".join(check(args.folder)) or f"no stored tables in {args.folder}")
