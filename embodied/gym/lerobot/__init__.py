@@ -14,14 +14,12 @@ For EnvHub, the file `env.py` of a repository has a `make_env` that calls this o
 from __future__ import annotations
 
 import functools
-from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
-from embodied.assets.cache import write_bytes
 from embodied.envs.continuous import POSITION
 from embodied.gym import continuous, drive
 from embodied.gym.driving import DriveSettings
