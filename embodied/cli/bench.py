@@ -1,8 +1,6 @@
 """Measure speed and memory on this machine, as medians.
 
-  houses, pictures, plays   generation, rendering, environment steps with help
-  seen                      steps with pixels
-  drive                     live pictures, and the steps of a body on wheels that sees them
+  houses, pictures, seen    generation, rendering, environment steps with pixels
   bakes                     light a flat repeatedly
   moving                    compare what moves with a path tracer, and what a frame costs then; takes an hour, in pieces
 
@@ -23,35 +21,33 @@ from embodied.render.pictures import DRAWN
 if TYPE_CHECKING:
     pass
 
-PARTS = ("houses", "pictures", "plays", "seen", "drive", "bakes", "moving")
+PARTS = ("houses", "pictures", "seen", "bakes", "moving")
 
 
 @dataclass(frozen=True, kw_only=True)
 class BenchOptions(Furnished, Printed):
     part: Annotated[tuple[str, ...], Option(metavar="PART", name="part")] = ()
-    """Benchmarks to run (default: houses, pictures, plays)."""
+    """Benchmarks to run (default: houses, pictures, seen)."""
     seed: int = 7
     """Seed of the houses."""
     pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
-    """How pictures, seen and drive draw the house."""
+    """How pictures and seen draw the house."""
     out: OutputFolder = Path("out/bench")
     """Folder for the files of moving."""
 
 
 def run(args: BenchOptions) -> None:
     from embodied import gl
-    from embodied.bench import bakes, drive, episodes, seen, timing, world
+    from embodied.bench import bakes, seen, timing, world
 
-    parts = args.part or ["houses", "pictures", "plays"]
+    parts = args.part or ["houses", "pictures", "seen"]
     if unknown := sorted(set(parts) - set(PARTS)):
         raise ValueError(f"unknown benchmark {unknown}; choose from {PARTS}")
     catalogue = catalogue_of(args)
     lines = {
         "houses": lambda: world.houses(catalogue, args.seed),
         "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.pictures),
-        "plays": lambda: episodes.plays(catalogue, args.seed),
         "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.pictures),
-        "drive": lambda: drive.drive(catalogue, args.cache, args.seed, args.pictures),
         "bakes": lambda: bakes.bakes(catalogue, args.cache, args.seed),
     }
     measures = []
