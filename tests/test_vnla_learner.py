@@ -17,6 +17,7 @@ from embodied.agents.common.playing import play_with_memory
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vnla.agent import ASKED, LEARNED, TEACHER, VnlaAbout, VnlaAgent, rules_of
 from embodied.agents.vnla.config import TRAINED_UNDER, VNLA_SCALES
+from embodied.agents.vnla.looking import READING
 from embodied.agents.vnla.network import (
     ASK,
     DONT,
@@ -67,7 +68,7 @@ def test_attention_and_coverage_are_those_of_the_equations():
 
 def percept(agents=3, left=2):
     before = torch.full((agents,), NO_MOVE), torch.full((agents,), NO_ASK), torch.full((agents,), left)
-    return VnlaPercept(torch.randn(agents, 16), *before, torch.ones(agents, STOP + 1, dtype=torch.bool))
+    return VnlaPercept(torch.randn(agents, READING), *before, torch.ones(agents, STOP + 1, dtype=torch.bool))
 
 
 def test_no_gradient_leaves_the_asking_head():

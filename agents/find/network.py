@@ -37,7 +37,25 @@ OTHER = 8
 """Numbers of a view, and of a class, that mean whatever helps."""
 
 
-class SeekNetwork(nn.Module):
+class Look(nn.Module):
+    """Looks into all views of a place, each with what is around it in mind."""
+
+    def __init__(self, features: int, size: int, dropout: float) -> None:
+        super().__init__()
+        self.dropout = dropout
+        self.scale = nn.LayerNorm(features)
+        self.see, self.around = nn.Linear(features, size), nn.Linear(2 * size, size)
+        self.join = nn.Linear(size, size)
+
+    def look(self, seen: Tensor) -> Tensor:
+        """(N, 36, h) of features (N, 36, D)."""
+        x = self.scale(seen) * F.dropout(seen.new_ones(len(seen), 1, seen.shape[-1]), self.dropout, self.training)
+        look = torch.relu(self.see(x))
+        around = self.around(torch.cat([look.amax(1), look.mean(1)], -1))
+        return F.dropout(torch.relu(self.join(look) + around[:, None]), self.dropout, self.training)
+
+
+class SeekNetwork(Look):
     """Reads every view for every class of things, then judges ways and stopping by what was read for the one wanted.
 
     The readers have labels for all classes at once; what is made of them is the same for all classes.
@@ -51,12 +69,9 @@ class SeekNetwork(nn.Module):
         """Args:
         requests: (C, L) int64 words of a request for each class.
         """
-        super().__init__()
+        super().__init__(features, size, dropout)
         self.register_buffer("requests", requests)
-        self.dropout, classes = dropout, len(requests)
-        self.scale = nn.LayerNorm(features)
-        self.see, self.around = nn.Linear(features, size), nn.Linear(2 * size, size)
-        self.join = nn.Linear(size, size)
+        classes = len(requests)
         self.readers = nn.Linear(size, len(READ) * classes)
         self.other, self.kinds = nn.Linear(size, OTHER), nn.Embedding(classes, OTHER)
         one = len(READ) + OTHER
@@ -66,13 +81,6 @@ class SeekNetwork(nn.Module):
         """In what is read: ways to what is visible, ways that lead there, and stopping at what is within reach."""
         self.price = nn.Linear(FACTS, 1, bias=False)
         self.price.weight.data = torch.tensor([[0.0, -5.0, 0.0, 0.0, 0.0]])  # at first a move costs half a logit
-
-    def look(self, seen: Tensor) -> Tensor:
-        """(N, 36, h) of features (N, 36, D), each view with what is around it in mind."""
-        x = self.scale(seen) * F.dropout(seen.new_ones(len(seen), 1, seen.shape[-1]), self.dropout, self.training)
-        look = torch.relu(self.see(x))
-        around = self.around(torch.cat([look.amax(1), look.mean(1)], -1))
-        return F.dropout(torch.relu(self.join(look) + around[:, None]), self.dropout, self.training)
 
     def read(self, seen: Tensor) -> Tensor:
         """(N, 36, READ, C) logits."""

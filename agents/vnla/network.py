@@ -2,7 +2,7 @@
 
 B agents, L words, h the hidden size, c the coverage, D the length of a view's features. Two heads share the
 decoder: navigation (6 actions: WORDS and stop) and asking (2: not to ask, to ask). What asking reads is detached, so
-that only its own head learns from its loss.
+that only its own head learns from its loss. Where to go is read from the panorama (embodied.agents.vnla.looking).
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from embodied.action_spaces import WORDS
 from embodied.agents.common.rows import Rows
 from embodied.agents.common.word_vectors import WordEmbedding
 from embodied.agents.vnla.config import VnlaSettings
+from embodied.agents.vnla.looking import READING, Looker
 
 ACTIONS = len(WORDS) + 1
 """Navigation actions: those of WORDS in their order, and stop."""
@@ -79,8 +80,8 @@ class DecoderState(Rows):
 class VnlaPercept(Rows):
     """Inputs of one pass for B agents."""
 
-    view: Tensor
-    """(B, D) features of the one view that the agent has."""
+    reading: Tensor
+    """(B, READING) what is read from the panorama for the request."""
     previous_move: Tensor
     """(B,) int64: a navigation action, or NO_MOVE."""
     previous_ask: Tensor
@@ -156,11 +157,13 @@ class VnlaNetwork(nn.Module):
         self.moves = nn.Embedding(ACTIONS + 1, config.navigation_embedding)
         self.asks = nn.Embedding(3, config.ask_embedding)
         self.budgets = nn.Embedding(MOST_LEFT + 1, config.budget_embedding)
-        self.decoder = nn.LSTMCell(config.navigation_embedding + config.ask_embedding + feature_size, h)
+        self.looker = Looker(words, feature_size, h, config.dropout)
+        self.decoder = nn.LSTMCell(config.navigation_embedding + config.ask_embedding + READING, h)
         self.attention = CoverageAttention(h, config.coverage)
         self.navigation = nn.Linear(h, ACTIONS)
+        self.glance = nn.Sequential(nn.Linear(READING, h), nn.ReLU(), nn.Linear(h, ACTIONS))
         self.asking = nn.Sequential(
-            nn.Linear(2 * h + feature_size + ACTIONS + config.budget_embedding, h),
+            nn.Linear(2 * h + READING + ACTIONS + config.budget_embedding, h),
             nn.ReLU(),
             nn.Dropout(config.dropout),
             nn.Linear(h, 2),
@@ -194,22 +197,22 @@ class VnlaNetwork(nn.Module):
         self, percept: VnlaPercept, state: DecoderState, text: ReadText
     ) -> tuple[Tensor, Tensor, DecoderState, Tensor]:
         """One step of the decoder: attended and plain output (B, h), the state and the coverage after it."""
-        inputs = [self.moves(percept.previous_move), self.asks(percept.previous_ask), percept.view]
+        inputs = [self.moves(percept.previous_move), self.asks(percept.previous_ask), percept.reading]
         hidden, cell = self.decoder(self.dropout(torch.cat(inputs, -1)), (state.hidden, state.cell))
         output = self.dropout(hidden)
         attended, _, coverage = self.attention(output, text)
         return attended, output, DecoderState(hidden, cell), coverage
 
-    def move_logits(self, attended: Tensor, allowed: Tensor) -> Tensor:
+    def move_logits(self, attended: Tensor, percept: VnlaPercept) -> Tensor:
         """(B, 6), -inf where an action is not possible."""
-        return self.navigation(attended).masked_fill(~allowed, -torch.inf)
+        return (self.navigation(attended) + self.glance(percept.reading)).masked_fill(~percept.allowed, -torch.inf)
 
     def navigate(
         self, percept: VnlaPercept, state: DecoderState, text: ReadText
     ) -> tuple[Tensor, DecoderState, ReadText]:
         """The pass that acts: logits (B, 6), and state and text after it."""
         attended, _, state, coverage = self.decode(percept, state, text)
-        return self.move_logits(attended, percept.allowed), state, dataclasses.replace(text, coverage=coverage)
+        return self.move_logits(attended, percept), state, dataclasses.replace(text, coverage=coverage)
 
     def consider(self, percept: VnlaPercept, state: DecoderState, text: ReadText) -> tuple[Tensor, Tensor]:
         """The pass that decides whether to ask, of which nothing is kept: probabilities (B, 6) and logits (B, 2).
@@ -218,6 +221,6 @@ class VnlaNetwork(nn.Module):
         """
         with torch.no_grad():
             attended, output, _, _ = self.decode(percept, state, text)
-            moves = self.move_logits(attended, percept.allowed).softmax(-1)
+            moves = self.move_logits(attended, percept).softmax(-1)
         left = self.budgets(percept.left.clamp(max=MOST_LEFT)).detach()
-        return moves, self.asking(torch.cat([attended, output, percept.view, moves, left], -1))
+        return moves, self.asking(torch.cat([attended, output, percept.reading, moves, left], -1))

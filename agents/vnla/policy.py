@@ -21,6 +21,7 @@ from embodied.agents.common.choosing import Chooser, choose_greedily, choose_sam
 from embodied.agents.common.playing import Supervised
 from embodied.agents.common.rows import RunningRows, hidden_channels
 from embodied.agents.common.vocabulary import Vocabulary
+from embodied.agents.find.policy import WORDS as REQUEST
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vnla.network import (
     ASK,
@@ -38,10 +39,10 @@ from embodied.interface import (
     TURNS,
     Actions,
     Ask,
+    Mode,
     Move,
     Observation,
     Observations,
-    Pose,
     Rngs,
     Situation,
     Situations,
@@ -80,6 +81,10 @@ class VnlaMemory(RunningRows):
     """The last view of each, from which the executed action is inferred; None before, and after asking."""
     times: tuple[frozenset[int], ...]
     """When the asker 'random' asks."""
+    request: Tensor
+    """(k, L) int64 words of the request."""
+    came: Tensor
+    """(k,) int64 turn that leads back where it came from; -1 for none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +126,7 @@ class VnlaPolicy:
         running = [(i, o) for i, o in enumerate(observations) if o is not None]
         positions, seen = tuple(i for i, _ in running), [o for _, o in running]
         now = [situations[p] for p in positions]
-        memory = self.start(positions, now, rngs) if memory is None else memory.keep(positions)
+        memory = self.start(positions, seen, now, rngs) if memory is None else memory.keep(positions)
         actions: Actions = [None] * len(observations)
         if not positions:
             return actions, memory
@@ -162,7 +167,9 @@ class VnlaPolicy:
             return ask_reason(s, thought, rules) is not None
         return self.asker == "first" or (self.asker == "learned" and (thought.asks or {})["help"] > self.ask_threshold)
 
-    def start(self, positions: tuple[int, ...], situations: Situations, rngs: Rngs) -> VnlaMemory:
+    def start(
+        self, positions: tuple[int, ...], seen: Sequence[Observation], situations: Situations, rngs: Rngs
+    ) -> VnlaMemory:
         """Memory before the first step of the episodes at `positions`."""
         k, device = len(positions), next(self.network.parameters()).device
         drawn = [
@@ -177,6 +184,10 @@ class VnlaPolicy:
             previous_ask=torch.full((k,), NO_ASK, device=device),
             before=(None,) * k,
             times=tuple(drawn),
+            request=torch.from_numpy(np.stack([self.vocabulary.encode(o.instruction, REQUEST) for o in seen])).to(
+                device
+            ),
+            came=torch.full((k,), -1, device=device),
             channels=hidden_channels(k, self.bank.size, self.environment_dropout, device),
         )
 
@@ -196,15 +207,23 @@ class VnlaPolicy:
             int(kept) if b is None else carried_out(b, o)
             for b, o, kept in zip(memory.before, seen, memory.previous_move.tolist(), strict=True)
         ]
-        return dataclasses.replace(memory, text=text, previous_move=torch.tensor(done, device=device))
+        back = [
+            (o.turn + TURNS // 2) % TURNS if o.moved and b else c
+            for b, o, c in zip(memory.before, seen, memory.came.tolist())
+        ]
+        before = {"previous_move": torch.tensor(done, device=device), "came": torch.tensor(back, device=device)}
+        return dataclasses.replace(memory, text=text, **before)
 
     def _percept(self, memory: VnlaMemory, seen: Sequence[Observation]) -> VnlaPercept:
         device = memory.previous_move.device
-        view = self.bank.look([o.sight for o in seen], [Pose(0, o.turn, o.tilt).view for o in seen])  # (k, D)
+        around = self.bank.gather([o.sight for o in seen]).float()  # (k, 36, D)
+        around = around if memory.channels is None else around * memory.channels[:, None]
         allowed = torch.from_numpy(np.stack([o.candidates.allowed for o in seen])).to(device)
         left = [MOST_LEFT if o.requests_left is None else o.requests_left for o in seen]
         return VnlaPercept(
-            view=view if memory.channels is None else view * memory.channels,
+            reading=self.network.looker.read(
+                around, memory.request, torch.tensor([o.turn for o in seen], device=device), memory.came, allowed[:, 0]
+            ),
             previous_move=memory.previous_move,
             previous_ask=memory.previous_ask,
             left=torch.tensor(left, device=device),
@@ -216,10 +235,10 @@ class VnlaPolicy:
     ) -> tuple[dict[int, Thought], Tensor]:
         """The first pass: what each of `rows` was about to do and whether it would ask, and logits (m, 2)."""
         if not rows:
-            return {}, percept.view.new_zeros(0, 2)
+            return {}, percept.reading.new_zeros(0, 2)
         state, text = memory.state, memory.text
         if len(rows) < len(memory.positions):
-            index = torch.tensor(rows, device=percept.view.device)
+            index = torch.tensor(rows, device=percept.reading.device)
             percept, state, text = percept.select(index), state.select(index), text.select(index)
         moves, asks = self.network.consider(percept, state, text)
         chances, help_ = moves.cpu().numpy(), asks.detach().softmax(-1)[:, ASK].tolist()
@@ -234,8 +253,8 @@ class VnlaPolicy:
     ) -> tuple[VnlaMemory, Tensor]:
         """The second pass: memory after it and logits (n, 6)."""
         if not rows:
-            return memory, percept.view.new_zeros(0, STOP + 1)
-        device = percept.view.device
+            return memory, percept.reading.new_zeros(0, STOP + 1)
+        device = percept.reading.device
         index = torch.tensor(rows, device=device)
         acts = torch.zeros(len(seen), dtype=torch.bool, device=device).index_fill(0, index, True)
         just_asked = [b is None and not o.can_ask for b, o in zip(memory.before, seen, strict=True)]
@@ -267,6 +286,12 @@ def carried_out(before: Observation, now: Observation) -> int:
     return STOP
 
 
+def _arrived(s: Situation) -> bool:
+    """True where to stop is to succeed: the program's teacher goes on to the goal's node (docs/sources.md, S198)."""
+    near = np.asarray(s.world.graph.distance)[s.pose.node, list(s.targets)].min() <= s.task.radius
+    return bool(near) and s.mode is Mode.MAIN
+
+
 def _moment(
     teacher: VnlaTeacher,
     situations: Situations,
@@ -280,6 +305,9 @@ def _moment(
     there = [s for s in situations if s is not None]
     assert len(there) == len(situations), "a teacher sees situations"
     wished = [int(ask_reason(there[row], thoughts[row], teacher.rules) is not None) for row in able]
-    wanted = [STOP if isinstance(a := teacher.reference(there[row]), Stop) else a.candidate for row in acting]
+    wanted = [
+        STOP if _arrived(s := there[row]) or isinstance(a := teacher.reference(s), Stop) else a.candidate
+        for row in acting
+    ]
     whole = functools.partial(torch.tensor, dtype=torch.long, device=moves.device)
     return VnlaMoment(asks, whole(wished), moves, whole(wanted))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Unpack
 
@@ -20,30 +20,50 @@ from torch import Tensor
 from embodied.action_spaces import WORDS
 from embodied.agents.common import imitation
 from embodied.agents.common.losses import negative_log_likelihood
-from embodied.agents.common.session import Progress
+from embodied.agents.common.session import Progress, descend, seeded_dropout, set_learning_rate
 from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent, rules_of
 from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
+from embodied.agents.vnla.looking import lessons_of, reading_loss
 from embodied.agents.vnla.policy import VnlaMoment, for_training
 from embodied.assistants.advisor import HELP_STEPS
 from embodied.datasets.store import Dataset
 from embodied.identity import identity_of
 from embodied.interface import Agent, Episode
 from embodied.language.plain_language import PlainLanguage
+from embodied.seeds import stream
 from embodied.teachers.vnla import VnlaTeacher
+
+
+LOOKING = 0.6
+"""Share of the updates, at the start, that only teach to read panoramas."""
 
 
 class VnlaLearner(imitation.ImitationLearner):
     """A VNLA agent in training."""
+
+    optimizer_kind = torch.optim.AdamW
 
     def __init__(self, agent: VnlaAgent, training: Split) -> None:
         super().__init__(agent, training)
         config = self.config
         teacher = VnlaTeacher(rules=rules_of(config))
         self._player = for_training(agent.policy(training.bank), teacher, config.environment_dropout)
+        shown = dataclasses.replace(training, bank=self._player.policy.bank)
+        self._lessons = lessons_of(shown, agent.vocabulary)
+
+    def learn(self, update: int) -> Mapping[str, float]:
+        c, looking = self.config, int(LOOKING * self.config.iterations)
+        if update >= looking:
+            return super().learn(update)
+        self.network.train()
+        with seeded_dropout(c.seed, update):
+            set_learning_rate(self.optimizer, c.learning_rate, update, looking, c.cooldown)
+            loss = reading_loss(self.network.looker, self._lessons, stream(c.seed, "looks", update))
+            return {"reading": float(loss.detach()), "gradient": descend(loss, self.optimizer, f"update {update}")}
 
     def player(self, update: int, bank: FeatureBank) -> Agent:
         seen = bank.blind() if self.config.blind else bank

@@ -1,0 +1,132 @@
+"""Looker: reads from the panorama of a place, for a request, which way to go and whether to stop; and its lessons.
+
+It has labels for all requests in all places of the training houses, as the learner of `find` has. Differs from the
+program, whose decoder is given the features of the one view ahead (docs/sources.md, S199).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from embodied.action_spaces import node_ahead
+from embodied.agents.common.vocabulary import Vocabulary
+from embodied.agents.common.word_vectors import WordEmbedding
+from embodied.agents.find.network import Look
+from embodied.agents.find.policy import WORDS, wanted
+from embodied.agents.vision.training_data import Split
+from embodied.interface import TURNS, Pose, Sight
+
+READING = 3 * TURNS + 2
+"""Numbers of a reading."""
+HOUSES, PLACES, REQUESTS = 8, 8, 8
+"""Of an update: houses, places of each and requests for each."""
+MORE = 4
+"""Requests that end in a place are drawn so many times more often for it than others."""
+
+
+class Looker(Look):
+    """Reads views for a request in words."""
+
+    def __init__(self, words: int, features: int, size: int, dropout: float) -> None:
+        super().__init__(features, size, dropout)
+        self.words, self.request = WordEmbedding(words, size), nn.Linear(size, 2 * size)
+        beside = lambda: nn.Conv1d(size, 1, 3, padding=1, padding_mode="circular")
+        self.leads, self.ways, self.there = beside(), beside(), nn.Linear(2 * size, 1)
+
+    def forward(self, seen: Tensor, requests: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits (N, G, 13) of the turn in which to go forward and, last, of stopping; and (N, 12) of the turns in which
+        that is possible.
+
+        Args:
+          seen: (N, 36, D) features.
+          requests: (N, G, L) int64 words; 0 is padding.
+        """
+        look = self.look(seen)
+        scale, shift = self.request(self.words(requests).sum(2))[:, :, None].chunk(2, -1)  # (N, G, 1, h)
+        meant = torch.relu(look[:, None] * (1 + scale) + shift)
+        there = self.there(torch.cat([meant.amax(2), meant.mean(2)], -1))
+        leads = self.leads(_turns(meant).flatten(0, 1)).unflatten(0, there.shape[:2])[:, :, 0]
+        return torch.cat([leads, there], -1), self.ways(_turns(look))[:, 0]
+
+    def read(self, seen: Tensor, requests: Tensor, turns: Tensor, came: Tensor, ahead: Tensor) -> Tensor:
+        """(N, READING) of one request each, as seen from where the agent looks; it teaches nothing.
+
+        Args:
+          requests: (N, L).
+          turns: (N,) int64, where the agent looks.
+          came: (N,) int64, the turn in which it would go back; below 0 for none.
+          ahead: (N,) bool, whether it can go forward.
+        """
+        with torch.no_grad():
+            chosen, ways = self(seen, requests[:, None])
+        back = F.one_hot(came.clamp(min=0), TURNS) * (came >= 0)[:, None]
+        of_turns = torch.stack([chosen[:, 0, :-1].softmax(-1), ways.sigmoid(), back], 1)  # (N, 3, 12)
+        index = (turns[:, None] + torch.arange(TURNS, device=turns.device)) % TURNS
+        turned = of_turns.gather(2, index[:, None].expand_as(of_turns))
+        return torch.cat([turned.flatten(1), chosen[:, 0, -1:].sigmoid(), ahead[:, None]], 1)
+
+
+def _turns(views: Tensor) -> Tensor:
+    """(..., h, 12) the most of all tilts, of views (..., 36, h)."""
+    return views.unflatten(-2, (-1, TURNS)).amax(-3).transpose(-1, -2)
+
+
+@dataclass(frozen=True, eq=False)
+class Lesson:
+    """All places and requests of one house: n places, G requests."""
+
+    seen: Tensor
+    """(n, 36, D) features."""
+    requests: Tensor
+    """(G, L) int64 words."""
+    wanted: Tensor
+    """(n, G, 13) float16, how good it is to go forward in each turn or to stop."""
+    ways: Tensor
+    """(n, 12) bool, whether one can go forward."""
+
+
+def lessons_of(split: Split, vocabulary: Vocabulary) -> list[Lesson]:
+    """The lessons of a split's houses, with the requests of its tasks."""
+    lessons = []
+    for name, tasks in itertools.groupby(sorted(split.tasks, key=lambda t: t.world), lambda t: t.world):
+        asked, place = {t.request: t for t in tasks}, split.worlds[name]
+        distance = np.asarray(place.graph.distance)
+        left = np.stack([distance[:, list(t.goal_nodes)].min(1) for t in asked.values()], 1)  # (n, G)
+        there = left <= np.array([t.radius for t in asked.values()])
+        want, ways = np.zeros((*left.shape, TURNS + 1), np.float16), np.zeros((len(left), TURNS), bool)
+        for node in range(len(left)):
+            ahead = [node_ahead(place.graph, Pose(node, turn)) for turn in range(TURNS)]
+            ends = [node if end is None else end for end in ahead]
+            ways[node] = [end is not None for end in ahead]
+            costs = np.where(ways[node], distance[node, ends] + left[ends].T, np.inf)  # (G, 12)
+            want[node, :, :-1] = [wanted(c) for c in costs]
+        want[..., -1] = there
+        seen = split.bank.gather([Sight(name, v) for v in range(len(left))])
+        words = np.stack([vocabulary.encode(r, WORDS) for r in asked])
+        lessons.append(Lesson(seen, *map(torch.from_numpy, (words, want, ways))))
+    return lessons
+
+
+def reading_loss(looker: Looker, lessons: Sequence[Lesson], rng: np.random.Generator) -> Tensor:
+    """Cross-entropy of what is read of some places with what the teacher does there, and of where ways begin."""
+    parts = []
+    for k in rng.integers(len(lessons), size=HOUSES):
+        lesson = lessons[k]
+        places = torch.from_numpy(rng.integers(len(lesson.seen), size=PLACES))
+        often = 1 + MORE * lesson.wanted[places, :, -1].float()  # (PLACES, G)
+        requests = (often / torch.from_numpy(rng.exponential(size=often.shape))).topk(REQUESTS, 1).indices
+        here = lesson.wanted[places[:, None], requests]
+        parts.append((lesson.seen[places], lesson.requests[requests], here, lesson.ways[places]))
+    seen, heard, want, ways = (torch.cat(x) for x in zip(*parts, strict=True))
+    chosen, there = looker(seen.float(), heard)
+    onward, stop = want.float().split([TURNS, 1], -1)
+    led = -((1 - stop) * onward * chosen[..., :-1].log_softmax(-1)).sum(-1).mean()
+    surely = F.binary_cross_entropy_with_logits
+    return led + 2 * surely(chosen[..., -1:], stop) + surely(there, ways.float())
