@@ -22,7 +22,6 @@ TINY = VnlaSettings(
     navigation_embedding=6,
     ask_embedding=5,
     budget_embedding=4,
-    coverage=3,
     dropout=0.1,
     instruction_length=30,
     iterations=4,

@@ -1,4 +1,4 @@
-"""VNLA's learner: coverage, the two losses, budgets, a head that is detached, resuming, and a run on a small house."""
+"""VNLA's learner: the two losses, budgets, a head that is detached, resuming, and a run on a small house."""
 
 from __future__ import annotations
 
@@ -18,17 +18,7 @@ from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vnla.agent import ASKED, LEARNED, TEACHER, VnlaAbout, VnlaAgent, rules_of
 from embodied.agents.vnla.config import TRAINED_UNDER, VNLA_SCALES
 from embodied.agents.vnla.looking import READING
-from embodied.agents.vnla.network import (
-    ASK,
-    DONT,
-    MOST_LEFT,
-    NO_ASK,
-    NO_MOVE,
-    STOP,
-    CoverageAttention,
-    ReadText,
-    VnlaPercept,
-)
+from embodied.agents.vnla.network import ASK, DONT, MOST_LEFT, NO_ASK, NO_MOVE, STOP, VnlaPercept
 from embodied.agents.vnla.policy import VnlaMoment, carried_out, for_training
 from embodied.agents.vnla.run import VnlaLearner, losses_of
 from embodied.envs.vnla import RULES_OF_PLAY
@@ -42,28 +32,6 @@ identity = lambda agent: identity_of(settings=agent.config, pictures=agent.about
 
 
 # The networks ------------------------------------------------------------------------------------
-
-
-def test_attention_and_coverage_are_those_of_the_equations():
-    """One agent, two words of one number each: the weights by hand, and what the GRU makes of them."""
-    attention = CoverageAttention(hidden=1, coverage=1)
-    for p in attention.parameters():
-        torch.nn.init.zeros_(p)
-    attention.query.weight.data.fill_(2.0)
-    attention.remembered.weight.data.fill_(0.5)
-    attention.out.weight.data.copy_(torch.tensor([[1.0, 0.0]]))
-    attention.memory.weight_ih.data.copy_(torch.tensor([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
-    read = torch.tensor([[[1.0], [3.0]]])
-    mask, coverage = torch.ones(1, 2, dtype=torch.bool), torch.tensor([[[2.0], [0.0]]])
-    text = ReadText(read, attention.driving(read), mask, coverage)
-    attended, weights, coverage = attention(torch.tensor([[0.5]]), text)
-    words = np.array([1 + 0.5 * 2, 3.0])  # the coverage of a word is added to it
-    scores = 2 * 0.5 * words
-    expected = np.exp(scores) / np.exp(scores).sum()
-    assert weights[0].tolist() == pytest.approx(expected.tolist())
-    assert attended.item() == pytest.approx(math.tanh(float(expected @ words)))
-    after = [0.5 * np.tanh(expected[0]) + 0.5 * 2, 0.5 * np.tanh(expected[1])]  # half new, half kept: gates at zero
-    assert coverage[0, :, 0].tolist() == pytest.approx(after)
 
 
 def percept(agents=3, left=2):

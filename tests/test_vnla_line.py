@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 SMALL = [
     *("--hidden-size", 16, "--word-embedding", 8, "--navigation-embedding", 4, "--ask-embedding", 4),
-    *("--budget-embedding", 4, "--coverage", 2, "--batch", 4, "--validation-tasks", 3, "--validate-every", 1),
+    *("--budget-embedding", 4, "--batch", 4, "--validation-tasks", 3, "--validate-every", 1),
     *("--threads", 1, "--encoder", COMPACT),
 ]
 

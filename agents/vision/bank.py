@@ -58,11 +58,6 @@ class FeatureBank:
         known = torch.tensor([s is not None for s in sights], device=self._table.device)
         return self._table[rows] * known[:, None, None]
 
-    def look(self, sights: Sequence[Sight], views: Sequence[int]) -> torch.Tensor:
-        """(n, D) features of one view of each sight."""
-        rows = torch.tensor([self._row(s) for s in sights], device=self._table.device)
-        return self._table[rows, torch.tensor(views, device=self._table.device)]
-
     def _with(self, **changed: object) -> FeatureBank:
         other = object.__new__(FeatureBank)
         other.__dict__.update(self.__dict__, **changed)

@@ -39,8 +39,6 @@ class VnlaSettings(ImitationSettings):
     """Width of an embedded decision to ask."""
     budget_embedding: int = 16
     """Width of the embedded number of remaining requests."""
-    coverage: int = 10
-    """Width of the coverage vectors, which record the attention to each word."""
     dropout: float = 0.5
     """Dropout rate in training."""
     iterations: int = 100_000
@@ -64,7 +62,7 @@ class VnlaSettings(ImitationSettings):
         require_word(self, "ask_rules", tuple(ASK_RULES))
         require_word(self, "rules", tuple(TRAINED_UNDER))
         require(self, AT_LEAST_ONE, "hidden_size", "word_embedding", "navigation_embedding", "ask_embedding")
-        require(self, AT_LEAST_ONE, "budget_embedding", "coverage")
+        require(self, AT_LEAST_ONE, "budget_embedding")
         require(self, NOT_ALL, "dropout")
 
 
@@ -73,7 +71,7 @@ VNLA_SCALES: dict[str, VnlaSettings] = {
         hidden_size=128,
         word_embedding=64,
         dropout=0.4,
-        iterations=2500,
+        iterations=2400,
         learning_rate=2e-3,
         cooldown=0.4,
         batch=64,

@@ -23,8 +23,8 @@ from embodied.agents.find.policy import WORDS, wanted
 from embodied.agents.vision.training_data import Split
 from embodied.interface import TURNS, Pose, Sight
 
-READING = 3 * TURNS + 2
-"""Numbers of a reading."""
+READ, READING = 2 * TURNS + 1, 3 * TURNS + 2
+"""Numbers that are read of a place, and of that as seen from where the agent looks."""
 HOUSES, PLACES, REQUESTS = 8, 8, 8
 """Of an update: houses, places of each and requests for each."""
 MORE = 4
@@ -41,8 +41,7 @@ class Looker(Look):
         self.leads, self.ways, self.there = beside(), beside(), nn.Linear(2 * size, 1)
 
     def forward(self, seen: Tensor, requests: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits (N, G, 13) of the turn in which to go forward and, last, of stopping; and (N, 12) of the turns in which
-        that is possible.
+        """Logits (N, G, 13) of the turn in which to go forward and, last, of being there; and (N, 12) that one can.
 
         Args:
           seen: (N, 36, D) features.
@@ -55,22 +54,28 @@ class Looker(Look):
         leads = self.leads(_turns(meant).flatten(0, 1)).unflatten(0, there.shape[:2])[:, :, 0]
         return torch.cat([leads, there], -1), self.ways(_turns(look))[:, 0]
 
-    def read(self, seen: Tensor, requests: Tensor, turns: Tensor, came: Tensor, ahead: Tensor) -> Tensor:
-        """(N, READING) of one request each, as seen from where the agent looks; it teaches nothing.
-
-        Args:
-          requests: (N, L).
-          turns: (N,) int64, where the agent looks.
-          came: (N,) int64, the turn in which it would go back; below 0 for none.
-          ahead: (N,) bool, whether it can go forward.
-        """
+    def read(self, seen: Tensor, requests: Tensor) -> Tensor:
+        """(N, READ) probabilities of `forward` for one request each (N, L); it teaches nothing."""
         with torch.no_grad():
             chosen, ways = self(seen, requests[:, None])
-        back = F.one_hot(came.clamp(min=0), TURNS) * (came >= 0)[:, None]
-        of_turns = torch.stack([chosen[:, 0, :-1].softmax(-1), ways.sigmoid(), back], 1)  # (N, 3, 12)
-        index = (turns[:, None] + torch.arange(TURNS, device=turns.device)) % TURNS
-        turned = of_turns.gather(2, index[:, None].expand_as(of_turns))
-        return torch.cat([turned.flatten(1), chosen[:, 0, -1:].sigmoid(), ahead[:, None]], 1)
+        leads, there = chosen[:, 0].split([TURNS, 1], -1)
+        return torch.cat([leads.softmax(-1), ways.sigmoid(), there.sigmoid()], -1)
+
+
+def turned(read: Tensor, turns: Tensor, came: Tensor, ahead: Tensor) -> Tensor:
+    """(N, READING) what was read (N, READ), as seen from where the agent looks.
+
+    Args:
+      turns: (N,) int64, where it looks.
+      came: (N,) int64, the turn in which it would go back; below 0 for none.
+      ahead: (N,) bool, whether it can go forward.
+    """
+    back = F.one_hot(came.clamp(min=0), TURNS) * (came >= 0)[:, None]
+    of_turns = torch.stack([*read[:, :-1].split(TURNS, -1), back], 1)  # (N, 3, 12)
+    index = (turns[:, None] + torch.arange(TURNS, device=turns.device)) % TURNS
+    return torch.cat(
+        [of_turns.gather(2, index[:, None].expand_as(of_turns)).flatten(1), read[:, -1:], ahead[:, None]], 1
+    )
 
 
 def _turns(views: Tensor) -> Tensor:

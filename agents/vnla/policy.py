@@ -19,10 +19,11 @@ from torch import Tensor
 from embodied.action_spaces import WORDS
 from embodied.agents.common.choosing import Chooser, choose_greedily, choose_sampled
 from embodied.agents.common.playing import Supervised
-from embodied.agents.common.rows import RunningRows, hidden_channels
+from embodied.agents.common.rows import RunningRows
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.find.policy import WORDS as REQUEST
 from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vnla.looking import READ, turned
 from embodied.agents.vnla.network import (
     ASK,
     DONT,
@@ -83,6 +84,8 @@ class VnlaMemory(RunningRows):
     """When the asker 'random' asks."""
     request: Tensor
     """(k, L) int64 words of the request."""
+    read: Tensor
+    """(k, READ) what was read of this place."""
     came: Tensor
     """(k,) int64 turn that leads back where it came from; -1 for none."""
 
@@ -99,8 +102,6 @@ class VnlaPolicy:
     ask_threshold: float = 0.5
     choose: Chooser = choose_greedily
     instruction_length: int = 50
-    environment_dropout: float = 0.0
-    """Share of feature channels that an episode does not see at all. For training."""
 
     def act(self, observations: Observations, memory: VnlaMemory | None, *, rngs: Rngs) -> tuple[Actions, VnlaMemory]:
         """One step of every running episode; see embodied.interface.Policy."""
@@ -187,8 +188,8 @@ class VnlaPolicy:
             request=torch.from_numpy(np.stack([self.vocabulary.encode(o.instruction, REQUEST) for o in seen])).to(
                 device
             ),
+            read=torch.zeros(k, READ, device=device),
             came=torch.full((k,), -1, device=device),
-            channels=hidden_channels(k, self.bank.size, self.environment_dropout, device),
         )
 
     def encode(self, text: str) -> np.ndarray:
@@ -207,23 +208,23 @@ class VnlaPolicy:
             int(kept) if b is None else carried_out(b, o)
             for b, o, kept in zip(memory.before, seen, memory.previous_move.tolist(), strict=True)
         ]
-        back = [
-            (o.turn + TURNS // 2) % TURNS if o.moved and b else c
-            for b, o, c in zip(memory.before, seen, memory.came.tolist())
-        ]
-        before = {"previous_move": torch.tensor(done, device=device), "came": torch.tensor(back, device=device)}
-        return dataclasses.replace(memory, text=text, **before)
+        new = [row for row, o in enumerate(seen) if o.moved or o.time == 0]
+        rows, read, came = torch.tensor(new, dtype=torch.long, device=device), memory.read, memory.came
+        if new:
+            around = self.bank.gather([seen[row].sight for row in new]).float()  # (n, 36, D)
+            read = read.index_copy(0, rows, self.network.looker.read(around, memory.request[rows]))
+            back = [(seen[row].turn + TURNS // 2) % TURNS if seen[row].moved else -1 for row in new]
+            came = came.index_copy(0, rows, torch.tensor(back, device=device))
+        done_moves = torch.tensor(done, device=device)
+        return dataclasses.replace(memory, text=text, previous_move=done_moves, read=read, came=came)
 
     def _percept(self, memory: VnlaMemory, seen: Sequence[Observation]) -> VnlaPercept:
         device = memory.previous_move.device
-        around = self.bank.gather([o.sight for o in seen]).float()  # (k, 36, D)
-        around = around if memory.channels is None else around * memory.channels[:, None]
+        turns = torch.tensor([o.turn for o in seen], device=device)
         allowed = torch.from_numpy(np.stack([o.candidates.allowed for o in seen])).to(device)
         left = [MOST_LEFT if o.requests_left is None else o.requests_left for o in seen]
         return VnlaPercept(
-            reading=self.network.looker.read(
-                around, memory.request, torch.tensor([o.turn for o in seen], device=device), memory.came, allowed[:, 0]
-            ),
+            reading=turned(memory.read, turns, memory.came, allowed[:, 0]),
             previous_move=memory.previous_move,
             previous_ask=memory.previous_ask,
             left=torch.tensor(left, device=device),
@@ -261,18 +262,14 @@ class VnlaPolicy:
         just_told = torch.tensor(just_asked, device=device) & (percept.previous_ask == ASK)
         asked = torch.where(acts, torch.where(just_told, ASK, DONT), percept.previous_ask)
         now = dataclasses.replace(percept, previous_ask=asked)
-        moves, state, text = self.network.navigate(now, memory.state, memory.text)  # who asks acts later: not kept
-        if len(rows) < len(seen):
-            state = state.where(acts, memory.state)
-            coverage = text.coverage.where(acts[:, None, None], memory.text.coverage)
-            moves, text = moves[index], dataclasses.replace(text, coverage=coverage)
-        return dataclasses.replace(memory, state=state, text=text, previous_ask=asked), moves
+        moves, state = self.network.navigate(now, memory.state, memory.text)
+        state = state.where(acts, memory.state)  # who asks acts later
+        return dataclasses.replace(memory, state=state, previous_ask=asked), moves[index]
 
 
-def for_training(policy: VnlaPolicy, teacher: VnlaTeacher, environment_dropout: float = 0.0) -> Supervised:
+def for_training(policy: VnlaPolicy, teacher: VnlaTeacher) -> Supervised:
     """The networks as they learn: moves are sampled, the learned asker asks when its teacher would."""
-    sampling = dataclasses.replace(policy, choose=choose_sampled, environment_dropout=environment_dropout)
-    return Supervised(sampling, {"rules": teacher.rules, "teacher": teacher})
+    return Supervised(dataclasses.replace(policy, choose=choose_sampled), {"rules": teacher.rules, "teacher": teacher})
 
 
 def carried_out(before: Observation, now: Observation) -> int:

@@ -37,8 +37,7 @@ from embodied.language.plain_language import PlainLanguage
 from embodied.seeds import stream
 from embodied.teachers.vnla import VnlaTeacher
 
-
-LOOKING = 0.6
+LOOKING = 0.7
 """Share of the updates, at the start, that only teach to read panoramas."""
 
 
@@ -51,7 +50,7 @@ class VnlaLearner(imitation.ImitationLearner):
         super().__init__(agent, training)
         config = self.config
         teacher = VnlaTeacher(rules=rules_of(config))
-        self._player = for_training(agent.policy(training.bank), teacher, config.environment_dropout)
+        self._player = for_training(agent.policy(training.bank), teacher)
         shown = dataclasses.replace(training, bank=self._player.policy.bank)
         self._lessons = lessons_of(shown, agent.vocabulary)
 
