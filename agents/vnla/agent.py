@@ -19,12 +19,8 @@ from embodied.teachers.vnla import AskRules
 
 WITHOUT_LEARNING = ("random walk", "listener, teacher", "shortest")
 TEACHER = "learned, asks as its teacher"
-ASKED = {
-    "learned, asks never": "none",
-    "learned, asks first": "first",
-    "learned, asks at random": "random",
-    TEACHER: "teacher",
-}
+NEVER, AT_RANDOM = "learned, asks never", "learned, asks at random"
+ASKED = {NEVER: "none", "learned, asks first": "first", AT_RANDOM: "random", TEACHER: "teacher"}
 """Rows that put another asker in front of the same networks (docs/sources.md, S39), and that asker."""
 DIRECT = "learned, direct intervention"
 """The advisor carries out what it said: direct with sub-goals in the paper."""

@@ -76,7 +76,7 @@ VNLA_SCALES: dict[str, VnlaSettings] = {
         cooldown=0.4,
         batch=64,
         instruction_length=40,
-        validate_every=250,
+        validate_every=480,
     ),
     "paper": VnlaSettings(),
 }

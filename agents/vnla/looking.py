@@ -1,7 +1,7 @@
 """Looker: reads from the panorama of a place, for a request, which way to go and whether to stop; and its lessons.
 
 It has labels for all requests in all places of the training houses, as the learner of `find` has. Differs from the
-program, whose decoder is given the features of the one view ahead (docs/sources.md, S199).
+program, whose decoder is given the features of the one view ahead (docs/sources.md, S190).
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ READ, READING = 2 * TURNS + 1, 3 * TURNS + 2
 """Numbers that are read of a place, and of that as seen from where the agent looks."""
 HOUSES, PLACES, REQUESTS = 8, 8, 8
 """Of an update: houses, places of each and requests for each."""
-MORE = 4
-"""Requests that end in a place are drawn so many times more often for it than others."""
+MORE, NEAR = 2, 6.0
+"""Requests whose goal is fewer metres away than NEAR are drawn that much more often than others."""
 
 
 class Looker(Look):
-    """Reads views for a request in words."""
+    """Reads the views of a place for a request in words."""
 
     def __init__(self, words: int, features: int, size: int, dropout: float) -> None:
         super().__init__(features, size, dropout)
@@ -95,6 +95,8 @@ class Lesson:
     """(n, G, 13) float16, how good it is to go forward in each turn or to stop."""
     ways: Tensor
     """(n, 12) bool, whether one can go forward."""
+    often: Tensor
+    """(n, G) float64, how often each request is drawn in each place."""
 
 
 def lessons_of(split: Split, vocabulary: Vocabulary) -> list[Lesson]:
@@ -115,7 +117,7 @@ def lessons_of(split: Split, vocabulary: Vocabulary) -> list[Lesson]:
         want[..., -1] = there
         seen = split.bank.gather([Sight(name, v) for v in range(len(left))])
         words = np.stack([vocabulary.encode(r, WORDS) for r in asked])
-        lessons.append(Lesson(seen, *map(torch.from_numpy, (words, want, ways))))
+        lessons.append(Lesson(seen, *map(torch.from_numpy, (words, want, ways, 1 + MORE * (left < NEAR)))))
     return lessons
 
 
@@ -125,8 +127,9 @@ def reading_loss(looker: Looker, lessons: Sequence[Lesson], rng: np.random.Gener
     for k in rng.integers(len(lessons), size=HOUSES):
         lesson = lessons[k]
         places = torch.from_numpy(rng.integers(len(lesson.seen), size=PLACES))
-        often = 1 + MORE * lesson.wanted[places, :, -1].float()  # (PLACES, G)
-        requests = (often / torch.from_numpy(rng.exponential(size=often.shape))).topk(REQUESTS, 1).indices
+        edges = lesson.often[places].cumsum(1)
+        drawn = torch.from_numpy(rng.random((PLACES, REQUESTS)))
+        requests = torch.searchsorted(edges, drawn * edges[:, -1:], right=True)
         here = lesson.wanted[places[:, None], requests]
         parts.append((lesson.seen[places], lesson.requests[requests], here, lesson.ways[places]))
     seen, heard, want, ways = (torch.cat(x) for x in zip(*parts, strict=True))

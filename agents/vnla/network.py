@@ -130,7 +130,7 @@ class VnlaNetwork(nn.Module):
     def decode(self, percept: VnlaPercept, state: DecoderState, text: ReadText) -> tuple[Tensor, Tensor, DecoderState]:
         """One step of the decoder: attended and plain output (B, h), and the state after it.
 
-        The program's attention also remembers how much it attended to each word (docs/sources.md, S200).
+        The program's attention also remembers how much it attended to each word (docs/sources.md, S192).
         """
         inputs = [self.moves(percept.previous_move), self.asks(percept.previous_ask), percept.reading]
         hidden, cell = self.decoder(self.dropout(torch.cat(inputs, -1)), (state.hidden, state.cell))

@@ -53,6 +53,13 @@ from embodied.interface import (
 from embodied.policies.baselines import random_times
 from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason
 
+SURE = 0.6
+"""Chance from which on it stops in evaluation."""
+BACK = {
+    WORDS.index(a): WORDS.index(b) for a, b in (("left", "right"), ("right", "left"), ("up", "down"), ("down", "up"))
+}
+"""Move that undoes each."""
+
 
 @dataclass(frozen=True, eq=False)
 class VnlaMoment:
@@ -148,6 +155,8 @@ class VnlaPolicy:
         for chance, row in zip(chances, acting, strict=True):
             place = positions[row]
             asked = thoughts[row].asks if row in thoughts else None
+            if teacher is None:
+                chance = _decided(chance, None if memory.before[row] is None else int(memory.previous_move[row]))
             number, thought = self.choose(chance, rngs[place]), Thought(chance, asked)
             actions[place] = Stop(thought) if number == STOP else Move(number, thought)
         if teacher is not None:
@@ -284,9 +293,18 @@ def carried_out(before: Observation, now: Observation) -> int:
 
 
 def _arrived(s: Situation) -> bool:
-    """True where to stop is to succeed: the program's teacher goes on to the goal's node (docs/sources.md, S198)."""
+    """True where to stop is to succeed: the program's teacher goes on to the goal's node (docs/sources.md, S191)."""
     near = np.asarray(s.world.graph.distance)[s.pose.node, list(s.targets)].min() <= s.task.radius
     return bool(near) and s.mode is Mode.MAIN
+
+
+def _decided(chances: np.ndarray, previous: int | None) -> np.ndarray:
+    """(6,) chances of moves in evaluation: none undoes the move before it, and who is unsure does not stop; greedy
+    decoding would turn to and fro (docs/sources.md, S193)."""
+    kept = np.where(np.arange(len(chances)) == BACK.get(previous, -1), 0, chances)
+    if chances[STOP] < SURE:
+        kept[STOP] = 0
+    return kept / kept.sum() if kept.any() else chances
 
 
 def _moment(

@@ -1,7 +1,7 @@
 """The tables of VNLA's first paper (Nguyen et al. 2019, arXiv 1812.04155) as data, and VNLA as a learner of the engine.
 
-Agents are judged with the program's five seeds, from which budgets are drawn. Who asks as its teacher does is the
-learned asker's agent: they are trained alike (docs/sources.md, S160).
+Agents are judged with the program's five seeds, from which budgets are drawn. Other askers play with the learned
+asker's networks (docs/sources.md, S160).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.studies.wordings import hearing, words_table
 from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy
-from embodied.agents.vnla.agent import DIRECT, LEARNED, TEACHER, VnlaAgent
+from embodied.agents.vnla.agent import AT_RANDOM, DIRECT, LEARNED, NEVER, TEACHER, VnlaAgent
 from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.run import train_agent
 from embodied.datasets.store import SplitData
@@ -35,21 +35,23 @@ def _table(title: str, *rows: StudyRow, compared: Sequence[tuple[StudyRow, Study
     return StudyTable(title, rows, VNLA_MEASURES, TEST_SPLITS, tuple(compared))
 
 
-RANDOM_ASKER, LEARNED_ASKER = _row("random", asker="random"), _row("learned")
-BLIND_ASKER = _row("learned, blind", blind=True)
+NONE, RANDOM_ASKER, LEARNED_ASKER = _row("none", NEVER), _row("random", AT_RANDOM), _row("learned")
+BLIND_NONE, BLIND_ASKER = _row("none, blind", NEVER, blind=True), _row("learned, blind", blind=True)
+LISTENER = StudyRow("scripted listener asking as the teacher", None, {"played": "listener, teacher"})
 PROGRAM, ALGORITHM_6 = _row("program's rules, learned"), _row("Algorithm 6, learned", rules="algorithm-6")
 VNLA_TABLES: Mapping[str, StudyTable] = {
     "askers": _table(
         "Who decides when to ask",
-        _row("none", asker="none"),
-        _row("first", asker="first"),
+        NONE,
+        _row("first", "learned, asks first"),
         RANDOM_ASKER,
         _row("teacher", TEACHER),
         LEARNED_ASKER,
+        BLIND_NONE,
         BLIND_ASKER,
         StudyRow("scripted listener asking at random", None, {"played": "listener, random"}),
-        StudyRow("scripted listener asking as the teacher", None, {"played": "listener, teacher"}),
-        compared=((LEARNED_ASKER, RANDOM_ASKER), (LEARNED_ASKER, BLIND_ASKER)),
+        LISTENER,
+        compared=((LEARNED_ASKER, RANDOM_ASKER), (LEARNED_ASKER, BLIND_ASKER), (LEARNED_ASKER, LISTENER)),
     ),
     "interventions": _table(
         "Direct and indirect intervention",
