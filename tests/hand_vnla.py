@@ -25,6 +25,7 @@ TINY = VnlaSettings(
     dropout=0.1,
     instruction_length=30,
     iterations=4,
+    looking=1,
     batch=6,
     learning_rate=3e-3,
     validate_every=4,

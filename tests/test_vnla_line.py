@@ -14,7 +14,7 @@ from embodied.identity import read_finished
 pytestmark = pytest.mark.slow
 
 SMALL = [
-    *("--hidden-size", 16, "--word-embedding", 8, "--navigation-embedding", 4, "--ask-embedding", 4),
+    *("--hidden-size", 16, "--word-embedding", 8, "--navigation-embedding", 4, "--ask-embedding", 4, "--looking", 0),
     *("--budget-embedding", 4, "--batch", 4, "--validation-tasks", 3, "--validate-every", 1),
     *("--threads", 1, "--encoder", COMPACT),
 ]

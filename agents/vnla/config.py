@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from embodied.agents.common.settings import AT_LEAST_ONE, NOT_ALL, ImitationSettings, require, require_word
+from embodied.agents.common.settings import (
+    AT_LEAST_ONE,
+    NOT_ALL,
+    NOT_NEGATIVE,
+    ImitationSettings,
+    require,
+    require_word,
+)
 
 ASKERS = ("none", "first", "random", "teacher", "learned")
 """Who decides when to ask (docs/sources.md, S51)."""
@@ -43,6 +50,8 @@ class VnlaSettings(ImitationSettings):
     """Dropout rate in training."""
     iterations: int = 100_000
     """Updates of the weights; the program's direct-mute agents: 70,000."""
+    looking: int = 10_000
+    """How many updates, at the start, only teach to read panoramas."""
     batch: int = 100
     """Episodes per update."""
     asker: str = "learned"
@@ -63,6 +72,7 @@ class VnlaSettings(ImitationSettings):
         require_word(self, "rules", tuple(TRAINED_UNDER))
         require(self, AT_LEAST_ONE, "hidden_size", "word_embedding", "navigation_embedding", "ask_embedding")
         require(self, AT_LEAST_ONE, "budget_embedding")
+        require(self, NOT_NEGATIVE, "looking")
         require(self, NOT_ALL, "dropout")
 
 
@@ -72,6 +82,7 @@ VNLA_SCALES: dict[str, VnlaSettings] = {
         word_embedding=64,
         dropout=0.4,
         iterations=2400,
+        looking=1680,
         learning_rate=2e-3,
         cooldown=0.4,
         batch=64,

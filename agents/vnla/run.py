@@ -37,9 +37,6 @@ from embodied.language.plain_language import PlainLanguage
 from embodied.seeds import stream
 from embodied.teachers.vnla import VnlaTeacher
 
-LOOKING = 0.7
-"""Share of the updates, at the start, that only teach to read panoramas."""
-
 
 class VnlaLearner(imitation.ImitationLearner):
     """A VNLA agent in training."""
@@ -55,12 +52,12 @@ class VnlaLearner(imitation.ImitationLearner):
         self._lessons = lessons_of(shown, agent.vocabulary)
 
     def learn(self, update: int) -> Mapping[str, float]:
-        c, looking = self.config, int(LOOKING * self.config.iterations)
-        if update >= looking:
+        c = self.config
+        if update >= c.looking:
             return super().learn(update)
         self.network.train()
         with seeded_dropout(c.seed, update):
-            set_learning_rate(self.optimizer, c.learning_rate, update, looking, c.cooldown)
+            set_learning_rate(self.optimizer, c.learning_rate, update, c.looking, c.cooldown)
             loss = reading_loss(self.network.looker, self._lessons, stream(c.seed, "looks", update))
             return {"reading": float(loss.detach()), "gradient": descend(loss, self.optimizer, f"update {update}")}
 
