@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -29,6 +28,9 @@ HOUSES, PLACES, REQUESTS = 8, 8, 8
 """Of an update: houses, places of each and requests for each."""
 MORE, NEAR = 2, 6.0
 """Requests whose goal is fewer metres away than NEAR are drawn that much more often than others."""
+Lesson = tuple[Tensor, ...]
+"""Of a house: features (n, 36, D), words (G, L), how good it is to go forward in each turn or to be there (n, G, 13),
+whether one can go forward (n, 12), how often each request is drawn in each place (n, G)."""
 
 
 class Looker(Look):
@@ -63,19 +65,13 @@ class Looker(Look):
 
 
 def turned(read: Tensor, turns: Tensor, came: Tensor, ahead: Tensor) -> Tensor:
-    """(N, READING) what was read (N, READ), as seen from where the agent looks.
-
-    Args:
-      turns: (N,) int64, where it looks.
-      came: (N,) int64, the turn in which it would go back; below 0 for none.
-      ahead: (N,) bool, whether it can go forward.
-    """
+    """(N, READING) what was read (N, READ), as seen from where the agent looks, turns (N,) int64; the turn in which
+    it would go back, came (N,) int64 or below 0, and whether it can go forward, ahead (N,) bool."""
     back = F.one_hot(came.clamp(min=0), TURNS) * (came >= 0)[:, None]
     of_turns = torch.stack([*read[:, :-1].split(TURNS, -1), back], 1)  # (N, 3, 12)
     index = (turns[:, None] + torch.arange(TURNS, device=turns.device)) % TURNS
-    return torch.cat(
-        [of_turns.gather(2, index[:, None].expand_as(of_turns)).flatten(1), read[:, -1:], ahead[:, None]], 1
-    )
+    rolled = of_turns.gather(2, index[:, None].expand_as(of_turns)).flatten(1)
+    return torch.cat([rolled, read[:, -1:], ahead[:, None]], 1)
 
 
 def _turns(views: Tensor) -> Tensor:
@@ -83,24 +79,8 @@ def _turns(views: Tensor) -> Tensor:
     return views.unflatten(-2, (-1, TURNS)).amax(-3).transpose(-1, -2)
 
 
-@dataclass(frozen=True, eq=False)
-class Lesson:
-    """All places and requests of one house: n places, G requests."""
-
-    seen: Tensor
-    """(n, 36, D) features."""
-    requests: Tensor
-    """(G, L) int64 words."""
-    wanted: Tensor
-    """(n, G, 13) float16, how good it is to go forward in each turn or to stop."""
-    ways: Tensor
-    """(n, 12) bool, whether one can go forward."""
-    often: Tensor
-    """(n, G) float64, how often each request is drawn in each place."""
-
-
 def lessons_of(split: Split, vocabulary: Vocabulary) -> list[Lesson]:
-    """The lessons of a split's houses, with the requests of its tasks."""
+    """The lesson of each house of a split, with the G requests of its tasks and its n places."""
     lessons = []
     for name, tasks in itertools.groupby(sorted(split.tasks, key=lambda t: t.world), lambda t: t.world):
         asked, place = {t.request: t for t in tasks}, split.worlds[name]
@@ -117,7 +97,7 @@ def lessons_of(split: Split, vocabulary: Vocabulary) -> list[Lesson]:
         want[..., -1] = there
         seen = split.bank.gather([Sight(name, v) for v in range(len(left))])
         words = np.stack([vocabulary.encode(r, WORDS) for r in asked])
-        lessons.append(Lesson(seen, *map(torch.from_numpy, (words, want, ways, 1 + MORE * (left < NEAR)))))
+        lessons.append((seen, *map(torch.from_numpy, (words, want, ways, 1 + MORE * (left < NEAR)))))
     return lessons
 
 
@@ -125,13 +105,11 @@ def reading_loss(looker: Looker, lessons: Sequence[Lesson], rng: np.random.Gener
     """Cross-entropy of what is read of some places with what the teacher does there, and of where ways begin."""
     parts = []
     for k in rng.integers(len(lessons), size=HOUSES):
-        lesson = lessons[k]
-        places = torch.from_numpy(rng.integers(len(lesson.seen), size=PLACES))
-        edges = lesson.often[places].cumsum(1)
-        drawn = torch.from_numpy(rng.random((PLACES, REQUESTS)))
+        seen, words, want, ways, often = lessons[k]
+        places = torch.from_numpy(rng.integers(len(seen), size=PLACES))
+        edges, drawn = often[places].cumsum(1), torch.from_numpy(rng.random((PLACES, REQUESTS)))
         requests = torch.searchsorted(edges, drawn * edges[:, -1:], right=True)
-        here = lesson.wanted[places[:, None], requests]
-        parts.append((lesson.seen[places], lesson.requests[requests], here, lesson.ways[places]))
+        parts.append((seen[places], words[requests], want[places[:, None], requests], ways[places]))
     seen, heard, want, ways = (torch.cat(x) for x in zip(*parts, strict=True))
     chosen, there = looker(seen.float(), heard)
     onward, stop = want.float().split([TURNS, 1], -1)

@@ -55,10 +55,8 @@ from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason
 
 SURE = 0.6
 """Chance from which on it stops in evaluation."""
-BACK = {
-    WORDS.index(a): WORDS.index(b) for a, b in (("left", "right"), ("right", "left"), ("up", "down"), ("down", "up"))
-}
-"""Move that undoes each."""
+BACK = {1: 2, 2: 1, 3: 4, 4: 3}
+"""Number of the move of WORDS that undoes another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,9 +192,7 @@ class VnlaPolicy:
             previous_ask=torch.full((k,), NO_ASK, device=device),
             before=(None,) * k,
             times=tuple(drawn),
-            request=torch.from_numpy(np.stack([self.vocabulary.encode(o.instruction, REQUEST) for o in seen])).to(
-                device
-            ),
+            request=torch.from_numpy(self.vocabulary.batch([o.instruction for o in seen], REQUEST)).to(device),
             read=torch.zeros(k, READ, device=device),
             came=torch.full((k,), -1, device=device),
         )
@@ -224,8 +220,8 @@ class VnlaPolicy:
             read = read.index_copy(0, rows, self.network.looker.read(around, memory.request[rows]))
             back = [(seen[row].turn + TURNS // 2) % TURNS if seen[row].moved else -1 for row in new]
             came = came.index_copy(0, rows, torch.tensor(back, device=device))
-        done_moves = torch.tensor(done, device=device)
-        return dataclasses.replace(memory, text=text, previous_move=done_moves, read=read, came=came)
+        previous = torch.tensor(done, device=device)
+        return dataclasses.replace(memory, text=text, previous_move=previous, read=read, came=came)
 
     def _percept(self, memory: VnlaMemory, seen: Sequence[Observation]) -> VnlaPercept:
         device = memory.previous_move.device
