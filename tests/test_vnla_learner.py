@@ -43,7 +43,7 @@ def test_no_gradient_leaves_the_asking_head():
     agent, *_ = lesson()
     network = agent.network
     text = network.read(torch.tensor([[5, 6, 2]] * 3))
-    _, asks = network.consider(percept(), network.start(3), text)
+    _, asks = network.consider(percept(), torch.zeros(3, 2, network.hidden_size), text)
     asks.sum().backward()
     touched = {name.split(".")[0] for name, p in network.named_parameters() if p.grad is not None and p.grad.any()}
     assert touched == {"asking"}
@@ -56,7 +56,7 @@ def test_the_asking_head_knows_how_many_requests_are_left_and_counts_no_further_
     torch.manual_seed(0)
     seen, text = percept(), network.read(torch.tensor([[5, 6, 2]] * 3))
     left = [dataclasses.replace(seen, left=torch.full((3,), n)) for n in (0, 1, MOST_LEFT, MOST_LEFT + 5)]
-    said = [network.consider(some, network.start(3), text)[1] for some in left]
+    said = [network.consider(some, torch.zeros(3, 2, network.hidden_size), text)[1] for some in left]
     assert not torch.allclose(said[0], said[1]) and torch.equal(said[2], said[3])
 
 
@@ -152,7 +152,9 @@ def test_features_of_another_encoder_are_refused():
 
 @pytest.mark.slow
 def test_it_learns_one_batch_by_heart():
-    config = dataclasses.replace(TINY, hidden_size=48, iterations=60, batch=4, learning_rate=8e-3, dropout=0.0)
+    config = dataclasses.replace(
+        TINY, hidden_size=48, looking=0, iterations=60, batch=4, learning_rate=8e-3, dropout=0.0
+    )
     agent, training, _ = lesson(config)
     learner = VnlaLearner(agent, dataclasses.replace(training, tasks=training.tasks[:4]))
     numbers = [learner.learn(u) for u in range(config.iterations)]

@@ -72,7 +72,7 @@ def test_the_tables_of_the_paper_from_one_command(data, tmp_path):
     assert run(*askers) == 0
     text = (tmp_path / "vnla-askers.md").read_text()
     assert "| teacher |" in text and f"| {LISTENER} |" in text and "(34.95)" in text
-    assert "Not run: none, first, random, learned, blind, scripted listener asking as the teacher." in text
+    assert "Not run: none, first, random, none, blind, learned, blind, scripted listener asking as the teacher." in text
     printed = ("study", "vnla", "algorithm-6", *words[3:], "--rows", "Algorithm 6, learned")
     assert run(*printed) == 0 and "| Algorithm 6, learned |" in (tmp_path / "vnla-algorithm-6.md").read_text()
     (trained,) = tmp_path.glob("runs/rules_algorithm_6*/trained.json")

@@ -26,11 +26,11 @@ READ, READING = 2 * TURNS + 1, 3 * TURNS + 2
 """Numbers that are read of a place, and of that as seen from where the agent looks."""
 HOUSES, PLACES, REQUESTS = 8, 8, 8
 """Of an update: houses, places of each and requests for each."""
-MORE, NEAR = 2, 6.0
-"""Requests whose goal is fewer metres away than NEAR are drawn that much more often than others."""
+MORE = 4
+"""Requests that end in a place are drawn that much more often for it than others."""
 Lesson = tuple[Tensor, ...]
 """Of a house: features (n, 36, D), words (G, L), how good it is to go forward in each turn or to be there (n, G, 13),
-whether one can go forward (n, 12), how often each request is drawn in each place (n, G)."""
+and whether one can go forward (n, 12)."""
 
 
 class Looker(Look):
@@ -97,7 +97,7 @@ def lessons_of(split: Split, vocabulary: Vocabulary) -> list[Lesson]:
         want[..., -1] = there
         seen = split.bank.gather([Sight(name, v) for v in range(len(left))])
         words = np.stack([vocabulary.encode(r, WORDS) for r in asked])
-        lessons.append((seen, *map(torch.from_numpy, (words, want, ways, 1 + MORE * (left < NEAR)))))
+        lessons.append((seen, *map(torch.from_numpy, (words, want, ways))))
     return lessons
 
 
@@ -105,10 +105,11 @@ def reading_loss(looker: Looker, lessons: Sequence[Lesson], rng: np.random.Gener
     """Cross-entropy of what is read of some places with what the teacher does there, and of where ways begin."""
     parts = []
     for k in rng.integers(len(lessons), size=HOUSES):
-        seen, words, want, ways, often = lessons[k]
+        seen, words, want, ways = lessons[k]
         places = torch.from_numpy(rng.integers(len(seen), size=PLACES))
-        edges, drawn = often[places].cumsum(1), torch.from_numpy(rng.random((PLACES, REQUESTS)))
-        requests = torch.searchsorted(edges, drawn * edges[:, -1:], right=True)
+        edges = (1 + MORE * want[places, :, -1].double()).cumsum(1)  # (PLACES, G)
+        drawn = torch.from_numpy(rng.random((PLACES, REQUESTS))) * edges[:, -1:]
+        requests = torch.searchsorted(edges, drawn, right=True)
         parts.append((seen[places], words[requests], want[places[:, None], requests], ways[places]))
     seen, heard, want, ways = (torch.cat(x) for x in zip(*parts, strict=True))
     chosen, there = looker(seen.float(), heard)

@@ -50,19 +50,6 @@ class ReadText(Rows):
 
 
 @dataclass(frozen=True, eq=False)
-class DecoderState(Rows):
-    """Hidden and cell state of the decoder, (B, h) each."""
-
-    hidden: Tensor
-    cell: Tensor
-
-    def where(self, rows: Tensor, other: DecoderState) -> DecoderState:
-        """This state where `rows` (B,) is true, else the other."""
-        chosen = rows[:, None]
-        return DecoderState(self.hidden.where(chosen, other.hidden), self.cell.where(chosen, other.cell))
-
-
-@dataclass(frozen=True, eq=False)
 class VnlaPercept(Rows):
     """Inputs of one pass for B agents."""
 
@@ -106,11 +93,6 @@ class VnlaNetwork(nn.Module):
         )
         self.dropout = nn.Dropout(config.dropout)
 
-    def start(self, agents: int) -> DecoderState:
-        """The decoder's state before the first step: zero, the reader's is not handed on."""
-        zero = self.navigation.weight.new_zeros(agents, self.hidden_size)
-        return DecoderState(zero, zero)
-
     def blank(self, agents: int) -> ReadText:
         """No text yet."""
         words = self.navigation.weight.new_zeros(agents, 0, self.hidden_size)
@@ -127,35 +109,28 @@ class VnlaNetwork(nn.Module):
         words, _ = self.reader(self.dropout(self.embedding(tokens[:, :longest])))
         return ReadText(self.dropout(words) * mask[..., None], mask)
 
-    def decode(self, percept: VnlaPercept, state: DecoderState, text: ReadText) -> tuple[Tensor, Tensor, DecoderState]:
-        """One step of the decoder: attended and plain output (B, h), and the state after it.
+    def navigate(self, percept: VnlaPercept, state: Tensor, text: ReadText) -> tuple[Tensor, Tensor, Tensor]:
+        """The pass that acts: logits (B, 6), -inf where an action is not possible; the decoder's state after it
+        (B, 2, h); and what asking reads of it (B, 2 h).
 
         The program's attention also remembers how much it attended to each word (docs/sources.md, S192).
         """
         inputs = [self.moves(percept.previous_move), self.asks(percept.previous_ask), percept.reading]
-        hidden, cell = self.decoder(self.dropout(torch.cat(inputs, -1)), (state.hidden, state.cell))
+        hidden, cell = self.decoder(self.dropout(torch.cat(inputs, -1)), state.unbind(1))
         output = self.dropout(hidden)
         scores = (text.words @ self.query(output)[..., None])[..., 0]
         weights = scores.masked_fill(~text.mask, -torch.inf).softmax(-1)
         context = (weights[:, None] @ text.words)[:, 0]
-        return torch.tanh(self.attended(torch.cat([context, output], -1))), output, DecoderState(hidden, cell)
+        attended = torch.tanh(self.attended(torch.cat([context, output], -1)))
+        moves = (self.navigation(attended) + self.glance(percept.reading)).masked_fill(~percept.allowed, -torch.inf)
+        return moves, torch.stack([hidden, cell], 1), torch.cat([attended, output], -1)
 
-    def move_logits(self, attended: Tensor, percept: VnlaPercept) -> Tensor:
-        """(B, 6), -inf where an action is not possible."""
-        return (self.navigation(attended) + self.glance(percept.reading)).masked_fill(~percept.allowed, -torch.inf)
-
-    def navigate(self, percept: VnlaPercept, state: DecoderState, text: ReadText) -> tuple[Tensor, DecoderState]:
-        """The pass that acts: logits (B, 6), and the state after it."""
-        attended, _, state = self.decode(percept, state, text)
-        return self.move_logits(attended, percept), state
-
-    def consider(self, percept: VnlaPercept, state: DecoderState, text: ReadText) -> tuple[Tensor, Tensor]:
+    def consider(self, percept: VnlaPercept, state: Tensor, text: ReadText) -> tuple[Tensor, Tensor]:
         """The pass that decides whether to ask, of which nothing is kept: probabilities (B, 6) and logits (B, 2).
 
         No gradient leaves the asking head.
         """
         with torch.no_grad():
-            attended, output, _ = self.decode(percept, state, text)
-            moves = self.move_logits(attended, percept).softmax(-1)
-        left = self.budgets(percept.left.clamp(max=MOST_LEFT)).detach()
-        return moves, self.asking(torch.cat([attended, output, percept.reading, moves, left], -1))
+            logits, _, known = self.navigate(percept, state, text)
+            moves, left = logits.softmax(-1), self.budgets(percept.left.clamp(max=MOST_LEFT))
+        return moves, self.asking(torch.cat([known, percept.reading, moves, left], -1))

@@ -24,18 +24,7 @@ from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.find.policy import WORDS as REQUEST
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vnla.looking import READ, turned
-from embodied.agents.vnla.network import (
-    ASK,
-    DONT,
-    MOST_LEFT,
-    NO_ASK,
-    NO_MOVE,
-    STOP,
-    DecoderState,
-    ReadText,
-    VnlaNetwork,
-    VnlaPercept,
-)
+from embodied.agents.vnla.network import ASK, DONT, MOST_LEFT, NO_ASK, NO_MOVE, STOP, ReadText, VnlaNetwork, VnlaPercept
 from embodied.interface import (
     TURNS,
     Actions,
@@ -77,7 +66,8 @@ class VnlaMoment:
 class VnlaMemory(RunningRows):
     """The policy's state between steps; rows belong to the episodes that still run."""
 
-    state: DecoderState
+    state: Tensor
+    """(k, 2, h) of the decoder."""
     text: ReadText
     previous_move: Tensor
     """(k,) int64."""
@@ -186,7 +176,7 @@ class VnlaPolicy:
         ]
         return VnlaMemory(
             positions=positions,
-            state=self.network.start(k),
+            state=torch.zeros(k, 2, self.network.hidden_size, device=device),
             text=self.network.blank(k),
             previous_move=torch.full((k,), NO_MOVE, device=device),
             previous_ask=torch.full((k,), NO_ASK, device=device),
@@ -245,7 +235,7 @@ class VnlaPolicy:
         state, text = memory.state, memory.text
         if len(rows) < len(memory.positions):
             index = torch.tensor(rows, device=percept.reading.device)
-            percept, state, text = percept.select(index), state.select(index), text.select(index)
+            percept, state, text = percept.select(index), state[index], text.select(index)
         moves, asks = self.network.consider(percept, state, text)
         chances, help_ = moves.cpu().numpy(), asks.detach().softmax(-1)[:, ASK].tolist()
         thoughts = {
@@ -267,8 +257,8 @@ class VnlaPolicy:
         just_told = torch.tensor(just_asked, device=device) & (percept.previous_ask == ASK)
         asked = torch.where(acts, torch.where(just_told, ASK, DONT), percept.previous_ask)
         now = dataclasses.replace(percept, previous_ask=asked)
-        moves, state = self.network.navigate(now, memory.state, memory.text)
-        state = state.where(acts, memory.state)  # who asks acts later
+        moves, state, _ = self.network.navigate(now, memory.state, memory.text)
+        state = state.where(acts[:, None, None], memory.state)  # who asks acts later
         return dataclasses.replace(memory, state=state, previous_ask=asked), moves[index]
 
 
