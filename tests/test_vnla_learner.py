@@ -11,15 +11,16 @@ import pytest
 import torch
 from hand_vnla import TINY, lesson, split_under
 
+from embodied.action_spaces import WORDS
 from embodied.agents.common import imitation
 from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.playing import play_with_memory
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vnla.agent import ASKED, LEARNED, TEACHER, VnlaAgent, rules_of
 from embodied.agents.vnla.config import TRAINED_UNDER
-from embodied.agents.vnla.looking import READING
+from embodied.agents.vnla.looking import READING, turned
 from embodied.agents.vnla.network import ASK, DONT, MOST_LEFT, NO_ASK, NO_MOVE, STOP, VnlaPercept
-from embodied.agents.vnla.policy import VnlaMoment, carried_out, for_training
+from embodied.agents.vnla.policy import VnlaMoment, _decided, carried_out, for_training
 from embodied.agents.vnla.run import VnlaLearner, losses_of
 from embodied.envs.vnla import RULES_OF_PLAY
 from embodied.evaluation.rollout import play
@@ -58,6 +59,31 @@ def test_the_asking_head_knows_how_many_requests_are_left_and_counts_no_further_
     left = [dataclasses.replace(seen, left=torch.full((3,), n)) for n in (0, 1, MOST_LEFT, MOST_LEFT + 5)]
     said = [network.consider(some, torch.zeros(3, 2, network.hidden_size), text)[1] for some in left]
     assert not torch.allclose(said[0], said[1]) and torch.equal(said[2], said[3])
+
+
+def test_what_is_read_of_a_place_is_told_as_seen_from_where_the_agent_looks():
+    read = torch.cat([torch.eye(12)[4], torch.eye(12)[5], torch.tensor([0.7])])[None]
+    seen = turned(read, torch.tensor([3]), torch.tensor([2]), torch.tensor([True]))[0]
+    leads, ways, back = seen[:36].split(12)
+    assert [int(x.argmax()) for x in (leads, ways, back)] == [1, 2, 11] and seen[36:].tolist() == pytest.approx(
+        [0.7, 1]
+    )
+    assert not turned(read, torch.tensor([3]), torch.tensor([-1]), torch.tensor([True]))[0, 24:36].any()
+
+
+def test_in_evaluation_no_turn_is_undone_and_who_is_unsure_goes_on():
+    left, right = WORDS.index("left"), WORDS.index("right")
+    chances = np.array([0.1, 0.05, 0.4, 0.0, 0.0, 0.45])
+    assert _decided(chances, None).argmax() == right and _decided(chances, left).argmax() == 0
+    assert _decided(np.array([0.1, 0.0, 0.25, 0.0, 0.0, 0.65]), left).argmax() == STOP
+
+
+@pytest.mark.slow
+def test_readers_learn_the_ways_of_a_house_by_heart():
+    agent, training, _ = lesson(dataclasses.replace(TINY, looking=80, iterations=80, dropout=0.0))
+    learner = VnlaLearner(agent, training)
+    numbers = [learner.learn(u)["reading"] for u in range(80)]
+    assert sum(numbers[-5:]) < 0.75 * sum(numbers[:5])
 
 
 # The losses --------------------------------------------------------------------------------------
@@ -153,14 +179,14 @@ def test_features_of_another_encoder_are_refused():
 @pytest.mark.slow
 def test_it_learns_one_batch_by_heart():
     config = dataclasses.replace(
-        TINY, hidden_size=48, looking=0, iterations=60, batch=4, learning_rate=8e-3, dropout=0.0
+        TINY, hidden_size=48, looking=60, iterations=160, batch=4, learning_rate=4e-3, dropout=0.0
     )
     agent, training, _ = lesson(config)
     learner = VnlaLearner(agent, dataclasses.replace(training, tasks=training.tasks[:4]))
-    numbers = [learner.learn(u) for u in range(config.iterations)]
+    numbers = [learner.learn(u) for u in range(config.iterations)][config.looking :]
     mean = lambda name, some: sum(n[name] for n in some) / len(some)
-    assert mean("right moves", numbers[-10:]) > 0.75 > 0.5 > mean("right moves", numbers[:5])
-    assert mean("loss navigation", numbers[-10:]) < 0.65 * mean("loss navigation", numbers[5:15])
+    assert mean("right moves", numbers[-10:]) > 0.65 > 0.55 > mean("right moves", numbers[:5])
+    assert mean("loss navigation", numbers[-10:]) < 0.9 * mean("loss navigation", numbers[5:15])
 
 
 @pytest.mark.slow

@@ -83,7 +83,7 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
         bank, names = source.split(split).bank, agent.rows()
         under = functools.cache(lambda rules: data.split(split, rules=rules))
         rows = {name: (under(agent.rules_of_row(name)), agent.player(bank, name)) for name in names}
-        return Players(rows, (BLIND, *WITHOUT_LEARNING), about)
+        return Players(rows, (*BLIND, *WITHOUT_LEARNING), about)
 
     return of_split
 

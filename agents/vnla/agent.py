@@ -17,7 +17,7 @@ from embodied.interface import Agent
 from embodied.kinds.shipped.vnla import VNLA
 from embodied.teachers.vnla import AskRules
 
-WITHOUT_LEARNING = ("random walk", "listener, teacher", "shortest")
+WITHOUT_LEARNING = ("random walk", "listener, random", "listener, teacher", "shortest")
 TEACHER = "learned, asks as its teacher"
 NEVER, AT_RANDOM = "learned, asks never", "learned, asks at random"
 ASKED = {NEVER: "none", "learned, asks first": "first", AT_RANDOM: "random", TEACHER: "teacher"}
@@ -25,8 +25,8 @@ ASKED = {NEVER: "none", "learned, asks first": "first", AT_RANDOM: "random", TEA
 DIRECT = "learned, direct intervention"
 """The advisor carries out what it said: direct with sub-goals in the paper."""
 LEARNED = "learned"
-BLIND = "learned, blind"
-"""The same networks, which see black."""
+BLIND = {"learned, blind": LEARNED, "blind, asks never": NEVER}
+"""Rows of the same networks, which see black, and who plays them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +68,7 @@ class VnlaAgent(SightedAgent):
     def rows(self) -> tuple[str, ...]:
         """All rows that it gives; direct intervention is that of one which learned to read what the advisor says."""
         direct = (DIRECT,) if self.config.rules == "indirect" else ()
-        return (LEARNED, BLIND, *ASKED, *direct, *WITHOUT_LEARNING)
+        return (LEARNED, *ASKED, *BLIND, *direct, *WITHOUT_LEARNING)
 
     def rules_of_row(self, row: str) -> str:
         """The rule of play that a row is judged under."""
@@ -78,7 +78,9 @@ class VnlaAgent(SightedAgent):
         """Who plays a row: shown the situations only where its asker needs them."""
         if row in WITHOUT_LEARNING:
             return VNLA.agent(row)
-        policy = self.policy(bank.blind() if row == BLIND else bank, ASKED.get(row))
+        if row in BLIND:
+            return self.player(bank.blind(), BLIND[row])
+        policy = self.policy(bank, None if row in (LEARNED, DIRECT) else ASKED[row])
         shown = policy.asker in ("random", "teacher")
         return Supervised(policy, {"rules": rules_of(self.config)}) if shown else policy
 
