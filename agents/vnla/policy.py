@@ -44,7 +44,7 @@ from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason
 
 SURE = 0.6
 """Chance from which on it stops in evaluation."""
-BACK = {1: 2, 2: 1, 3: 4, 4: 3}
+UNDOES = {1: 2, 2: 1, 3: 4, 4: 3}
 """Number of the move of WORDS that undoes another."""
 
 
@@ -287,7 +287,7 @@ def _arrived(s: Situation) -> bool:
 def _decided(chances: np.ndarray, previous: int | None) -> np.ndarray:
     """(6,) chances of moves in evaluation: none undoes the move before it, and who is unsure does not stop; greedy
     decoding would turn to and fro (docs/sources.md, S193)."""
-    kept = np.where(np.arange(len(chances)) == BACK.get(previous, -1), 0, chances)
+    kept = np.where(np.arange(len(chances)) == UNDOES.get(previous, -1), 0, chances)
     if chances[STOP] < SURE:
         kept[STOP] = 0
     return kept / kept.sum() if kept.any() else chances
