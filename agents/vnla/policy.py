@@ -187,17 +187,14 @@ class VnlaPolicy:
             came=torch.full((k,), -1, device=device),
         )
 
-    def encode(self, text: str) -> np.ndarray:
-        """(L,) int64 numbers of the words, the last one first, then the end, then padding, as in the program."""
-        return self.vocabulary.encode(text, self.instruction_length, backwards=True)
-
     def _listen(self, memory: VnlaMemory, seen: Sequence[Observation]) -> VnlaMemory:
         """Read the texts that are new, and notice what was carried out: an advisor may have acted in its place."""
         device = memory.previous_move.device
         new = [row for row, o in enumerate(seen) if o.time_on_task == 0]
         text = memory.text
         if new:
-            tokens = torch.from_numpy(np.stack([self.encode(seen[row].instruction) for row in new])).to(device)
+            say = lambda row: self.vocabulary.encode(seen[row].instruction, self.instruction_length, backwards=True)
+            tokens = torch.from_numpy(np.stack([say(row) for row in new])).to(device)  # backwards, as in the program
             text = text.put(torch.tensor(new, device=device), self.network.read(tokens))
         done = [
             int(kept) if b is None else carried_out(b, o)

@@ -45,9 +45,7 @@ class VnlaLearner(imitation.ImitationLearner):
 
     def __init__(self, agent: VnlaAgent, training: Split) -> None:
         super().__init__(agent, training)
-        config = self.config
-        teacher = VnlaTeacher(rules=rules_of(config))
-        self._player = for_training(agent.policy(training.bank), teacher)
+        self._player = for_training(agent.policy(training.bank), VnlaTeacher(rules=rules_of(self.config)))
         shown = dataclasses.replace(training, bank=self._player.policy.bank)
         self._lessons = lessons_of(shown, agent.vocabulary)
 
@@ -62,8 +60,7 @@ class VnlaLearner(imitation.ImitationLearner):
             return {"reading": float(loss.detach()), "gradient": descend(loss, self.optimizer, f"update {update}")}
 
     def player(self, update: int, bank: FeatureBank) -> Agent:
-        seen = bank.blind() if self.config.blind else bank
-        return dataclasses.replace(self._player, policy=dataclasses.replace(self._player.policy, bank=seen))
+        return self._player
 
     def loss_of(self, episodes: Sequence[Episode], experience: Sequence[VnlaMoment]) -> imitation.BatchLoss:
         losses = losses_of(experience, self.config.batch)
