@@ -284,7 +284,9 @@ def _arrived(s: Situation) -> bool:
 def _decided(chances: np.ndarray, previous: int | None) -> np.ndarray:
     """(6,) chances of moves in evaluation: none undoes the move before it, and who is unsure does not stop; greedy
     decoding would turn to and fro (docs/sources.md, S193)."""
-    kept = np.where(np.arange(len(chances)) == UNDOES.get(previous, -1), 0, chances)
+    kept = chances.copy()
+    if previous in UNDOES:
+        kept[UNDOES[previous]] = 0
     if chances[STOP] < SURE:
         kept[STOP] = 0
     return kept / kept.sum() if kept.any() else chances
