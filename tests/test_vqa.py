@@ -8,6 +8,7 @@ import math
 
 import cv2
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from conftest import two_rooms
 from hand_chat import ChatServer, first_allowed
@@ -150,3 +151,13 @@ def test_the_command_makes_questions_about_what_the_frames_show(tmp_path, capsys
     assert {*table["scores"]} == {"chance", "llm", *BLIND} and table["types"] == [
         *dict.fromkeys(q.type for q in questions)
     ]
+    assert main(["view", data, "--episode", "0"]) == 0
+    assert cv2.imread(f"{data}/sheets/0.png").shape[1] == 4 * 480
+    for form in ("vsi", "llava"):
+        assert main(["export", "vqa", "--data", data, "--out", str(tmp_path / form), "--form", form]) == 0
+    rows = pq.read_table(tmp_path / "vsi/test.parquet").to_pylist()
+    assert [r["ground_truth"] for r in rows] == [q.letter for q in questions]
+    film = cv2.VideoCapture(str(tmp_path / f"vsi/vsibench/embodied/{rows[0]['scene_name']}.mp4"))
+    assert film.get(cv2.CAP_PROP_FRAME_COUNT) == len([*(home / f"walk_{rows[0]['scene_name'][-1]}").glob("*.jpg")])
+    said = json.loads((tmp_path / "llava/test.jsonl").read_text().splitlines()[0])["conversations"]
+    assert said[0]["value"].startswith("<image>") and said[1]["value"] == questions[0].letter

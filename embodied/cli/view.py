@@ -1,7 +1,8 @@
-"""Look at the episodes of a run.
+"""Look at the episodes of a run, or at questions about houses.
 
 RUN is a folder that `embodied evaluate` wrote. The command lists its episodes; --episode N with --data records one, and
 with --video films it. The recording shows what the agent saw; `rerun FILE.rrd` opens it.
+Of a folder of `embodied dataset vqa`, the command lists questions; --episode N draws one with frames and outlines.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from embodied.cli.common import Furnished, Printed, bar, catalogue_of, note, show
 from embodied.cli.recording import Filmed, Viewers, film, viewers_of
+from embodied.cli.vqa import look
 from embodied.options import InputFolder, Option, OutputRrd, any_path, drawn_as, whole
 from embodied.render.pictures import DRAWN
 
@@ -29,9 +31,9 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, kw_only=True)
 class ViewOptions(Filmed, Viewers, Furnished, Printed):
     folder: Annotated[Path, Option(any_path, "RUN", name="folder")]
-    """A folder with episodes*.jsonl."""
+    """A folder with episodes*.jsonl, or with questions."""
     episode: Annotated[int | None, Option(whole(0), "N")] = None
-    """Record episode N of the list."""
+    """Record episode N of the list, or draw question N."""
     data: InputFolder | None = None
     """The data set of the run, for --episode."""
     pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
@@ -43,6 +45,9 @@ class ViewOptions(Filmed, Viewers, Furnished, Printed):
 def run(args: ViewOptions) -> None:
     from embodied.viz.report import load_run, summary_line
 
+    if (args.folder / "vqa.json").exists():
+        look(args)
+        return
     episodes = load_run(args.folder)
     if args.episode is not None:
         record_one(args, episodes, args.episode)

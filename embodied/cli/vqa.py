@@ -1,4 +1,4 @@
-"""Questions about houses (`vqa`): what the commands dataset and evaluate do with them."""
+"""Questions about houses (`vqa`): what the commands dataset, evaluate and view do with them."""
 
 from __future__ import annotations
 
@@ -7,16 +7,22 @@ import itertools
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+import cv2
+import numpy as np
+
 from embodied.cli.common import bar, check_machine, note, pause, show
 
 if TYPE_CHECKING:
     from embodied.cli.dataset import DatasetOptions
     from embodied.cli.evaluate import EvaluateOptions
+    from embodied.cli.view import ViewOptions
     from embodied.datasets.vqa.build import VqaData
     from embodied.datasets.vqa.scoring import VqaQuestion
 
 VQA, DEFAULT_HOUSES, PER_HOUSE, TOGETHER = "vqa", {"train": 40, "test": 10}, 200, 32
 """Houses of the splits, and questions of a house, unless options say otherwise; questions sent at a time."""
+COLOURS = ((40, 40, 255), (60, 200, 60), (255, 120, 30), (0, 210, 255), (230, 60, 230), (255, 255, 0))
+"""BGR of the outline of the first thing that a question is about, the second, ..."""
 
 
 def make(args: DatasetOptions) -> None:
@@ -97,3 +103,50 @@ def answered(args: EvaluateOptions, data: VqaData, questions: Sequence[VqaQuesti
             asked.append((prompt.messages(frames, question=q.prompt), schema))
         yield from ("" if a.value is None else str(a.value["answer"]) for a in client.ask_all(asked))
     note(f"{client.sent} requests were sent; all other answers were in {args.answers}")
+
+
+def look(args: ViewOptions) -> None:
+    """`embodied view` of a folder of questions: their list, or one of them as a picture."""
+    from embodied.datasets.vqa.build import VqaData
+
+    data = VqaData(args.folder)
+    questions = [q for split in data.about["counts"] for q in data.questions(split)]
+    if args.episode is None:
+        facts = [{"number": k, "id": q.id, "answer": q.answer} for k, q in enumerate(questions)]
+        show(args, {"questions": facts}, "\n".join(f"{k}: {q.text} {q.answer}" for k, q in enumerate(questions)))
+    elif args.episode >= len(questions):
+        raise ValueError(f"--episode {args.episode} does not exist; there are questions 0 to {len(questions) - 1}")
+    else:
+        path = args.folder / "sheets" / f"{args.episode}.png"
+        path.parent.mkdir(exist_ok=True)
+        cv2.imwrite(str(path), sheet(data, questions[args.episode]))
+        show(args, {"picture": str(path)}, f"wrote {path}")
+
+
+def sheet(data: VqaData, question: VqaQuestion, columns: int = 4, line: int = 24) -> np.ndarray:
+    """(h, w, 3) BGR: a question and its answer, above frames of its walk: evenly spaced ones, and the one that shows
+    each thing best that it is about, outlined."""
+    from embodied.house.house import House
+
+    files = data.frames(question.walk)
+    house = House.load(files[0].parents[1] / "house.json")
+    number = {p.id: i + 1 for i, p in enumerate(house.placements)}
+    outlined = [(name, number[name], c) for name, c in zip(question.about, COLOURS) if name in number]
+    ids = [np.asarray(cv2.imread(str(f.with_suffix(".png")), -1)) for f in files]
+    best = {max(range(len(ids)), key=lambda k: (ids[k] == i).sum()) for _, i, _ in outlined}
+    say = lambda on, text, x, y, colour=(0, 0, 0): cv2.putText(on, text[:230], (x, y), 0, 0.5, colour, 1, cv2.LINE_AA)
+    pictures = []
+    for k in sorted(best | {*np.linspace(0, len(files) - 1, columns).astype(int).tolist()}):
+        picture = say(np.asarray(cv2.imread(str(files[k]))), str(k), 6, 352, (255, 255, 255))
+        for _, i, colour in outlined:
+            edges, _ = cv2.findContours((ids[k] == i).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+            cv2.drawContours(picture, edges, -1, colour, 2)
+        pictures.append(picture)
+    pictures += [np.full_like(pictures[0], 255)] * (-len(pictures) % columns)
+    head = np.full((4 * line + 8, columns * pictures[0].shape[1], 3), 255, np.uint8)
+    options = "   ".join(question.prompt.split("\n")[2:-1])
+    for k, text in enumerate((f"{question.id}: {question.text}", options, f"{question.letter}   {question.fact}"), 1):
+        say(head, text, 8, line * k)
+    for k, (name, _, colour) in enumerate(outlined):
+        say(head, name, 8 + 300 * k, 4 * line, colour)
+    return np.vstack([head, *(np.hstack(pictures[i : i + columns]) for i in range(0, len(pictures), columns))])
