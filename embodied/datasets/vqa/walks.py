@@ -87,8 +87,9 @@ def film(world: World, track: Sequence[Camera], folder: Path) -> Iterator[WalkFr
     things = world.house.placement_by_id
     for k, (position, yaw) in enumerate(track):
         view = world.camera(position, yaw, *LENS)
-        jpg, png = ("jpg", view.rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 88]), ("png", view.ids.astype(np.uint16), [])
-        for kind, picture, how in (jpg, png):
+        pictures = {"jpg": view.rgb[..., ::-1], "png": view.ids.astype(np.uint16)}
+        for kind, picture in pictures.items():
+            how = [cv2.IMWRITE_JPEG_QUALITY, 88] if kind == "jpg" else []
             write_bytes(folder / f"{k:03d}.{kind}", cv2.imencode(f".{kind}", picture, how)[1].tobytes())
         shares = shares_of(world, view.ids)
         cut = {world.owners[i - 1] for side in (0, -1) for i in {*view.ids[side], *view.ids[:, side]} if i}
