@@ -22,9 +22,10 @@ from embodied.datasets.habitat import (
     read_vlnce,
     rotation_of,
     to_habitat,
+    with_experts,
+    write_vlnce,
     yaw_of,
 )
-from embodied.datasets.vlnce import teach
 from embodied.envs.continuous import (
     Body,
     ContinuousEnv,
@@ -268,31 +269,19 @@ def test_habitats_frame_has_y_up_and_agents_look_along_minus_z():
     assert to_habitat((1, 2, 3)) == [1, 3, -2] and from_habitat(to_habitat((1, 2, 3))) == (1, 2, 3)
 
 
-def write_vlnce(folder, walks):
-    """VLN-CE's files of episodes and of an expert's walks, as Habitat has them."""
-    episode = lambda e: {
-        "episode_id": e.id, "trajectory_id": e.trajectory, "scene_id": f"mp3d/{e.world}/{e.world}.glb",
-        "start_position": to_habitat(e.start), "start_rotation": rotation_of(e.yaw),
-        "goals": [{"position": to_habitat(g.position), "radius": e.radius} for g in e.goals],
-        "instruction": {"instruction_text": e.instruction}, "reference_path": [to_habitat(p) for p in e.reference],
-    }  # fmt: skip
-    experts = {
-        w.episode.id: {"locations": [to_habitat(p) for p in w.positions.tolist()], "actions": list(w.actions)}
-        for w in walks
-    }
-    episodes = [episode(w.episode) for w in walks]
-    (folder / "val.json.gz").write_bytes(gzip.compress(json.dumps({"episodes": episodes}).encode()))
-    (folder / "val_gt.json.gz").write_bytes(gzip.compress(json.dumps(experts).encode()))
-    return folder / "val.json.gz", episodes[0], experts
-
-
 def test_vlnce_episodes_come_back_from_their_files(world, dataset, tmp_path):
-    walks = [teach(ContinuousEnv(), e, world).trajectory for e in dataset.episodes[:3]]
-    whole, item, experts = write_vlnce(tmp_path, walks)
-    for walk, back in zip(walks, read_vlnce(whole), strict=True):
-        ours = replace(walk.episode, expert=tuple(map(tuple, walk.positions.tolist())))
-        assert replace(back, yaw=ours.yaw) == ours
+    walked = with_experts(dataset.episodes[:3], dataset.worlds, ContinuousEnv())
+    whole, gt = write_vlnce(tmp_path, "val", walked)
+    for ours, back in zip([e for e, _ in walked], read_vlnce(whole), strict=True):
+        assert replace(back, yaw=ours.yaw) == replace(ours, trajectory=back.trajectory)
         assert back.yaw == pytest.approx(float((ours.yaw + math.pi) % (2 * math.pi) - math.pi), abs=1e-9)
+    file = json.loads(gzip.decompress(whole.read_bytes()))
+    words, item = file["instruction_vocab"]["word_list"], file["episodes"][0]
+    said = [words[k] for k in item["instruction"]["instruction_tokens"] if k]
+    told = item["instruction"]
+    assert len(told["instruction_tokens"]) == 200 and said[0] in told["instruction_text"].lower()
+    experts = json.loads(gzip.decompress(gt.read_bytes()))
+    assert experts["1"]["actions"][-1] == 0
     again = open_episodes("vlnce", worlds={world.name: world}, episodes=whole, **SMALL)
     env = ContinuousGymEnv(replace(again, observations=()))
     env.reset(options={"episode": 0})

@@ -72,10 +72,11 @@ def test_walks_of_a_data_set_are_written_in_its_houses(tmp_path, monkeypatch):
     monkeypatch.setattr(
         drive, "data_worlds", lambda folder, split, cache, _: found(folder, split, cache, Unlit(size=64))
     )
-    order = ["export", "lerobot-vlnce", "--data", str(data.folder), "--out", str(tmp_path / "out"), "--cache"]
+    order = ["export", "vlnce", "--data", str(data.folder), "--out", str(tmp_path / "out"), "--cache"]
     assert cli.main([*order, str(tmp_path / "cache"), "--tasks", "1", "--width", "64", "--action-noise", "0.1"]) == 0
-    (words,) = pq.read_table(tmp_path / "out/meta/tasks.parquet").to_pydict()["task"]
-    assert words == data.tasks("train")[0].request
+    rows = [json.loads(line) for line in (tmp_path / "out/samples.jsonl").read_text().splitlines()]
+    assert {row["instruction"] for row in rows} == {data.tasks("train")[0].request}
+    assert all((tmp_path / "out" / row["image"]).is_file() for row in rows)
 
 
 @pytest.mark.gl

@@ -120,6 +120,7 @@ def test_whoever_takes_a_folder_finds_nothing_that_a_killed_process_left_in_it(t
 ORDERS = {
     "evaluate": ["evaluate", "hanna", "--agent", "shortest", "--data", "{data}", "--out", "{out}"],
     "export hanna": ["export", "hanna", "--data", "{data}", "--out", "{out}"],
+    "export parquet": ["export", "parquet", "--data", "{data}", "--out", "{out}"],
     "export mjcf": ["export", "mjcf", "--house", "{out}", "--light", "none", "--out", "{out}"],
     "light": ["light", "{out}", "--hour", "9"],
     "light more": ["light", "{out}", "--lights", "2"],

@@ -133,6 +133,7 @@ def test_a_person_plays_it_in_a_study(data):
 
 
 def test_it_is_exported(data, tmp_path):
+    assert main(["export", "parquet", "--data", str(data.folder), "--out", str(tmp_path / "tables")]) == 0
     paint(data, Baked("fast", size=16), data.names("train"))
     order = ["export", "lerobot", "--data", str(data.folder), "--out", str(tmp_path / "robot"), "--size", "16"]
     assert main([*order, "--tasks", "2"]) == 0

@@ -11,7 +11,7 @@ from conftest import two_rooms
 from handmade import furnished
 
 from embodied.cli import main
-from embodied.datasets.scene_graph import scene_graph
+from embodied.datasets.scene_graph import scene_graph, write_spark_dsg
 from embodied.navigation.graph import build_graph
 
 HOUSE = furnished(two_rooms())
@@ -52,3 +52,13 @@ def test_the_command_writes_maps_whose_pixels_are_what_stands_there(tmp_path):
     )
     assert main(["export", "scene-graph", "--house", str(tmp_path), "--out", str(tmp_path / "g.json")]) in (0, None)
     assert json.loads((tmp_path / "g.json").read_text())["digest"] == HOUSE.digest
+
+
+def test_spark_dsg_opens_what_is_written_for_it(tmp_path):
+    dsg = pytest.importorskip("spark_dsg")
+    write_spark_dsg(facts(), tmp_path / "graph.json")
+    graph = dsg.DynamicSceneGraph.load(str(tmp_path / "graph.json"))
+    names = {node.attributes.name for node in graph.get_layer(dsg.DsgLayers.OBJECTS).nodes}
+    assert names == {p.id for p in HOUSE.placements}
+    room = next(n for n in graph.get_layer(dsg.DsgLayers.ROOMS).nodes if n.attributes.name == "living_room_1")
+    assert room.has_parent() and len(list(room.children())) > 3

@@ -11,8 +11,9 @@ import pyarrow.parquet as pq
 import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
+from PIL import Image
 
-from embodied.datasets.vlnce import export_walks, frames, noisy_actions, teach
+from embodied.datasets.vlnce import FORMATS, export_walks, frames, noisy_actions, teach
 from embodied.envs.continuous import CameraConfig, ContinuousEnv, ContinuousEpisode, HabitatAction, NavigationGoal
 from embodied.world import open_world
 
@@ -34,9 +35,10 @@ def episode(world) -> ContinuousEpisode:
 
 
 @pytest.fixture(scope="module")
-def written(world, tmp_path_factory):
-    home = tmp_path_factory.mktemp("forms") / "lerobot"
-    export_walks(home, [episode(world)], {world.name: world}, seed=0, camera=SMALL, depth=True)
+def folders(world, tmp_path_factory):
+    home = tmp_path_factory.mktemp("forms")
+    for form in FORMATS:
+        export_walks(form, home / form, [episode(world)], {world.name: world}, seed=0, camera=SMALL, depth=True)
     return home
 
 
@@ -45,8 +47,19 @@ def taught(world):
     return teach(ContinuousEnv(), episode(world), world)
 
 
-def test_lerobots_form_has_the_experts_action_the_way_so_far_and_depth_of_12_bits(written, taught):
-    home = written
+def test_samples_lead_whoever_takes_their_actions_to_the_goal(folders, world, taught):
+    lines = [json.loads(line) for line in (folders / "vlnce" / "samples.jsonl").read_text().splitlines()]
+    env = ContinuousEnv()
+    env.reset(episode(world), world)
+    for line in lines:
+        assert Image.open(folders / "vlnce" / line["image"]).size == (48, 32)
+        env.step(line["action"])
+    assert env.ended and env.distance < 0.3 and lines[-1]["action"] == HabitatAction.STOP
+    assert (folders / "vlnce/train/train_gt.json.gz").exists()
+
+
+def test_lerobots_form_has_the_experts_action_the_way_so_far_and_depth_of_12_bits(folders, world, taught):
+    home = folders / "lerobot-vlnce"
     rows = pq.read_table(home / "data/chunk-000/file-000.parquet").to_pydict()
     assert np.argmax(rows["action"], axis=1).tolist() == list(taught.labels)
     assert rows["observation.state"][0] == pytest.approx([0, 0, 0, 1, 0], abs=1e-6)
@@ -69,4 +82,4 @@ def test_labels_of_a_walk_with_action_noise_lead_back(world):
 def test_a_folder_with_files_is_refused(world, tmp_path):
     (tmp_path / "note").write_text("mine")
     with pytest.raises(ValueError, match="not empty"):
-        export_walks(tmp_path, [episode(world)], {world.name: world}, seed=0)
+        export_walks("vlnce", tmp_path, [episode(world)], {world.name: world}, seed=0)

@@ -1,7 +1,10 @@
 """Measure speed and memory on this machine, as medians.
 
-  houses, pictures, seen    generation, rendering, environment steps with pixels
+  houses, pictures, plays   generation, rendering, environment steps with help
+  views, seen               views of a panorama, steps with pixels
+  drive                     live pictures, and the steps of a body on wheels that sees them
   bakes                     light a flat repeatedly
+  light                     compare the ways of rendering with a path tracer
   moving                    compare what moves with a path tracer, and what a frame costs then; takes an hour, in pieces
 
 Close other programs first.
@@ -12,42 +15,42 @@ from __future__ import annotations
 import itertools
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.options import Option, OutputFolder, drawn_as
 from embodied.render.pictures import DRAWN
 
-if TYPE_CHECKING:
-    pass
-
-PARTS = ("houses", "pictures", "seen", "bakes", "moving")
+PARTS = ("houses", "pictures", "views", "plays", "seen", "drive", "bakes", "light", "moving")
 
 
 @dataclass(frozen=True, kw_only=True)
 class BenchOptions(Furnished, Printed):
     part: Annotated[tuple[str, ...], Option(metavar="PART", name="part")] = ()
-    """Benchmarks to run (default: houses, pictures, seen)."""
+    """Benchmarks to run (default: houses, pictures, plays)."""
     seed: int = 7
     """Seed of the houses."""
     pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
-    """How pictures and seen draw the house."""
+    """How pictures, seen and drive draw the house."""
     out: OutputFolder = Path("out/bench")
-    """Folder for the files of moving."""
+    """Folder for the files of light and moving."""
 
 
 def run(args: BenchOptions) -> None:
     from embodied import gl
-    from embodied.bench import bakes, seen, timing, world
+    from embodied.bench import bakes, drive, episodes, light, seen, timing, views, world
 
-    parts = args.part or ["houses", "pictures", "seen"]
+    parts = args.part or ["houses", "pictures", "plays"]
     if unknown := sorted(set(parts) - set(PARTS)):
         raise ValueError(f"unknown benchmark {unknown}; choose from {PARTS}")
     catalogue = catalogue_of(args)
     lines = {
         "houses": lambda: world.houses(catalogue, args.seed),
         "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.pictures),
+        "views": lambda: views.views(catalogue, args.cache, args.seed),
+        "plays": lambda: episodes.plays(catalogue, args.seed),
         "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.pictures),
+        "drive": lambda: drive.drive(catalogue, args.cache, args.seed, args.pictures),
         "bakes": lambda: bakes.bakes(catalogue, args.cache, args.seed),
     }
     measures = []
@@ -63,6 +66,9 @@ def run(args: BenchOptions) -> None:
     facts["measures"] = [asdict(m) for m in measures]
     if measures:
         texts.append(timing.table(measures))
+    if "light" in parts:
+        facts["light"] = light.compare(catalogue, args.cache, args.out, seed=args.seed, progress=note)
+        texts.append(light.table(facts["light"]))
     if "moving" in parts:
         from embodied.bench import moving  # late: loads the path tracer and MuJoCo
 

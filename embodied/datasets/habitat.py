@@ -10,11 +10,14 @@ Habitat's frame has y up: (x, y, z) there is (x, z, -y) here. An agent looks alo
 from __future__ import annotations
 
 import gzip
+import itertools
 import json
 import math
 import re
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +25,27 @@ import numpy as np
 
 from embodied.assets.cache import write_bytes
 from embodied.assets.json_file import RecordError, parse, shown
-from embodied.envs.continuous import ContinuousEpisode, NavigationGoal, NavMeshCache, Point, seen_from
+from embodied.envs.continuous import (
+    ContinuousEnv,
+    ContinuousEpisode,
+    ContinuousTrajectory,
+    NavigationGoal,
+    NavMeshCache,
+    Point,
+    ShortestPathFollower,
+    seen_from,
+)
 from embodied.interface import FindInTurn, FollowRoute, Place, Task
+from embodied.mattersim.conventions import tokenised
 from embodied.seeds import stream
 from embodied.tasks.goals import GOAT_REACH, find_instances
 
+INSTRUCTION_TOKENS = 200
+"""Tokens of an instruction in VLN-CE's files, filled up with zeros."""
 LARGEST_FILE = 2**30
 """Most bytes of a file, unpacked; VLN-CE's largest has a fifth."""
+SPECIAL = ("<pad>", "<unk>")
+"""Words 0 and 1 of the vocabulary."""
 REACH = 1.0
 """ObjectNav: an object is found within so many metres of its outline, in its room."""
 UPRIGHT = 0.01
@@ -122,7 +139,75 @@ def object_episodes(
     return episodes
 
 
+def with_experts(
+    episodes: Iterable[ContinuousEpisode], places: Mapping[str, Place], env: ContinuousEnv
+) -> list[tuple[ContinuousEpisode, ContinuousTrajectory]]:
+    """Each episode with the walk of an expert along its path, and its positions written into the episode."""
+    expert_episodes = []
+    for e in episodes:
+        env.reset(e, places[e.world])
+        expert = ShortestPathFollower(env, along=bool(e.reference))
+        while not env.ended:
+            env.step(expert.action())
+        trajectory = env.trajectory()
+        passed = itertools.groupby((x, y, z) for x, y, z in trajectory.positions.tolist())
+        whole = replace(e, expert=tuple(place for place, _ in passed))
+        expert_episodes.append((whole, replace(trajectory, episode=whole)))
+    return expert_episodes
+
+
 # Files -------------------------------------------------------------------------------------------
+
+
+def write_vlnce(
+    folder: Path, split: str, walked: Sequence[tuple[ContinuousEpisode, ContinuousTrajectory]]
+) -> list[Path]:
+    """<split>.json.gz and <split>_gt.json.gz of VLN-CE; returns both.
+
+    Args:
+      walked: episodes and an expert's walks, from `with_experts`.
+    """
+    words = [w for w, _ in Counter(w for e, _ in walked for w in tokenised(e.instruction).split()).most_common()]
+    word_list = [*SPECIAL, *words]
+    number = {w: k for k, w in enumerate(word_list)}
+    episodes, experts = [], {}
+    for e, trajectory in walked:
+        tokens = [number[w] for w in tokenised(e.instruction).split()][:INSTRUCTION_TOKENS]
+        episodes.append(
+            {
+                "episode_id": int(e.id) if e.id.isdecimal() else e.id,
+                "trajectory_id": e.trajectory or e.id,
+                "scene_id": f"embodied/{e.world}/{e.world}.glb",
+                "start_position": to_habitat(e.start),
+                "start_rotation": rotation_of(e.yaw),
+                "info": {"geodesic_distance": trajectory.shortest},
+                "goals": [{"position": to_habitat(a.position), "radius": e.radius} for a in e.goals],
+                "instruction": {
+                    "instruction_text": e.instruction,
+                    "instruction_tokens": tokens + [0] * (INSTRUCTION_TOKENS - len(tokens)),
+                },
+                "reference_path": [to_habitat(p) for p in e.reference],
+            }
+        )
+        experts[e.id] = {
+            "locations": [to_habitat(p) for p in e.expert],
+            "forward_steps": sum(a == 1 for a in trajectory.actions),
+            "actions": list(trajectory.actions),
+        }
+    vocabulary = {
+        "word_list": word_list,
+        "word2idx_dict": number,
+        "itos": word_list,
+        "stoi": number,
+        "num_vocab": len(word_list),
+        "UNK_INDEX": 1,
+        "PAD_INDEX": 0,
+    }
+    home = Path(folder) / split
+    return [
+        _write(home / f"{split}.json.gz", {"episodes": episodes, "instruction_vocab": vocabulary}),
+        _write(home / f"{split}_gt.json.gz", experts),
+    ]
 
 
 def write_goat(folder: Path, split: str, tasks: Iterable[Task], places: Mapping[str, Place]) -> list[Path]:

@@ -11,7 +11,8 @@ import cv2
 import numpy as np
 import shapely
 
-from embodied.assets.cache import write_bytes, write_json
+from embodied.assets.cache import atomic_path, write_bytes, write_json
+from embodied.errors import UnableError
 from embodied.house.house import House, Placement
 from embodied.house.moment import WIDEST
 from embodied.house.shapes import footprint
@@ -92,6 +93,58 @@ def _edges(house: House, graph: NavGraph) -> Iterator[dict[str, Any]]:
 def is_on_top(p: Placement, carrier: Placement) -> bool:
     """True for what rests on the top of its carrier, False for what is inside, as books on a shelf below the top."""
     return p.position[2] >= carrier.position[2] + 0.9 * carrier.size[2]
+
+
+def write_spark_dsg(facts: dict[str, Any], path: Path) -> None:
+    """Write a `scene_graph` as Hydra's DynamicSceneGraph: objects and furniture, places, rooms, one building.
+
+    Raises:
+      UnableError: the package spark-dsg is not installed.
+    """
+    try:
+        import spark_dsg as dsg  # type: ignore[import-not-found,unused-ignore]
+    except ImportError as e:
+        raise UnableError(f"--form spark needs spark-dsg ({e}); pip install spark-dsg, or write --form json") from e
+
+    layers = dsg.DsgLayers
+    forms = {
+        "building": (layers.BUILDINGS, "B", dsg.SemanticNodeAttributes),
+        "room": (layers.ROOMS, "R", dsg.RoomNodeAttributes),
+        "place": (layers.PLACES, "p", dsg.PlaceNodeAttributes),
+        "furniture": (layers.OBJECTS, "O", dsg.ObjectNodeAttributes),
+        "object": (layers.OBJECTS, "O", dsg.ObjectNodeAttributes),
+    }
+    classes = sorted({n.get("class") or n.get("kind", n["layer"]) for n in facts["nodes"]})
+    out, symbols, count = dsg.DynamicSceneGraph(), {}, itertools.count()
+    for node in facts["nodes"]:
+        if node["layer"] not in forms:
+            continue
+        layer, letter, kind = forms[node["layer"]]
+        attributes = kind()
+        attributes.position, attributes.name = np.array(node["position"], float), node["id"]
+        attributes.semantic_label = classes.index(node.get("class") or node.get("kind", node["layer"]))
+        if "size" in node:
+            place = np.array(node["position"], np.float32)
+            attributes.bounding_box = dsg.BoundingBox(np.array(node["size"], np.float32), place, node["yaw"])
+        symbols[node["id"]] = symbol = dsg.NodeSymbol(letter, next(count))
+        out.add_node(layer, symbol, attributes)
+    carriers = {e["from"]: e["to"] for e in facts["edges"] if e["relation"] in ("on", "in")}
+    room_of = {e["to"]: e["from"] for e in facts["edges"] if e["relation"] == "contains"}
+    for node in facts["nodes"]:
+        name = node["id"]
+        while name in carriers:
+            name = carriers[name]
+        if node["id"] in symbols and node["layer"] in ("furniture", "object", "place"):
+            out.insert_edge(symbols[room_of[name]], symbols[node["id"]])
+        elif node["layer"] == "room":
+            out.insert_edge(symbols["building"], symbols[node["id"]])
+    for edge in facts["edges"]:
+        if edge["relation"] in ("door", "walk", "on", "in", "next to"):
+            out.insert_edge(symbols[edge["from"]], symbols[edge["to"]])
+    out.metadata.set({"labels": classes})
+    with atomic_path(path) as temporary:
+        out.save(str(temporary.with_suffix(".json")), include_mesh=False)
+        temporary.with_suffix(".json").replace(temporary)
 
 
 def write_semantic_maps(house: House, folder: Path) -> int:

@@ -1,11 +1,14 @@
-"""Continuous walks as LeRobot data (v3.0): image, action and instruction at every step, for policies that
-`lerobot-eval` judges in embodied.gym.lerobot.
+"""Continuous walks as training data: image, action and instruction at every step, in the forms that models train on.
+
+  vlnce        samples.jsonl with a line per step, images/, and the episodes in Habitat's files
+  lerobot-vlnce    LeRobot v3.0, for policies that `lerobot-eval` judges in embodied.gym.lerobot
 
 A walk may leave the expert's way: what is written as the action is always what the expert does there (DAgger).
 """
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -13,7 +16,10 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+from PIL import Image
 
+from embodied.datasets.folders import write_lines
+from embodied.datasets.habitat import with_experts, write_vlnce
 from embodied.datasets.lerobot import STEP_COLUMNS, Columns, RecordedCamera, Writer, whole_folder
 from embodied.envs.continuous import (
     POSITION,
@@ -29,6 +35,7 @@ from embodied.render.camera import camera_at
 from embodied.seeds import stream
 from embodied.world import World
 
+FORMATS = ("vlnce", "lerobot-vlnce")
 SQUARE = CameraConfig()
 STEPS = 4
 """Steps a second of LeRobot's data."""
@@ -83,6 +90,7 @@ def frames(taught: Taught, camera: CameraConfig) -> Iterator[tuple[np.ndarray, n
 
 
 def export_walks(
+    form: str,
     folder: Path,
     episodes: Iterable[ContinuousEpisode],
     worlds: dict[str, World],
@@ -90,20 +98,23 @@ def export_walks(
     seed: int,
     camera: CameraConfig = SQUARE,
     action_noise: float = 0.0,
+    split: str = "train",
     depth: bool = False,
     watch: Callable[[Iterable[ContinuousEpisode]], Iterable[ContinuousEpisode]] = iter,
 ) -> int:
-    """Play episodes and write them; returns how many steps there are.
+    """Play episodes and write them in one of FORMATS; returns how many steps there are.
 
     Args:
       folder: new or empty; it appears when it is whole.
       action_noise: the share of actions, below 1, that are drawn instead of the expert's; what is written stays his.
-      depth: whether there are videos of depth; policies that want colours alone cannot read them.
+      depth: whether 'lerobot-vlnce' has videos of depth; policies that want colours alone cannot read them.
       watch: goes through the episodes, as a progress bar does.
 
     Raises:
-      ValueError: a folder with files, or no episodes.
+      ValueError: an unknown form, a folder with files, or no episodes.
     """
+    if form not in FORMATS:
+        raise ValueError(f"unknown form {form!r}; use one of {FORMATS}")
     if not 0 <= action_noise < 1:
         raise ValueError(f"action_noise is a share from 0 to below 1, got {action_noise}")
     chosen_episodes = list(episodes)
@@ -113,7 +124,28 @@ def export_walks(
     chosen = noisy_actions(action_noise, stream(seed, "wander"))
     taught = (teach(env, e, worlds[e.world], chosen) for e in watch(chosen_episodes))
     with whole_folder(folder) as draft:
-        return _lerobot(draft, taught, camera, depth)
+        if form == "lerobot-vlnce":
+            return _lerobot(draft, taught, camera, depth)
+        write_vlnce(draft, split, with_experts(chosen_episodes, worlds, ContinuousEnv()))
+        return _samples(draft, taught, camera)
+
+
+def _samples(folder: Path, walks: Iterable[Taught], camera: CameraConfig) -> int:
+    lines: list[str] = []
+    for t in walks:
+        for k, (rgb, _) in enumerate(frames(t, camera)):
+            image = f"images/{t.trajectory.episode.world}_{t.trajectory.episode.id}/{k:03d}.jpg"
+            (folder / image).parent.mkdir(parents=True, exist_ok=True)
+            Image.fromarray(rgb).save(folder / image, quality=92)
+            facts = {"episode": t.trajectory.episode.id, "world": t.trajectory.episode.world, "step": k, "image": image}
+            facts |= {
+                "instruction": t.trajectory.episode.instruction,
+                "taken": t.trajectory.actions[k],
+                "action": t.labels[k],
+            }
+            lines.append(json.dumps(facts))
+    write_lines(folder / "samples.jsonl", lines)
+    return len(lines)
 
 
 SCORES = ("stop", "forward", "left", "right")

@@ -19,6 +19,8 @@ class SceneGraphOptions(Printed):
     """Folder that `embodied house` wrote."""
     out: Annotated[Path, Option(file_ending_in(".json"), "FILE")]
     """File to write."""
+    form: Annotated[str, Option(words=("json", "spark"))] = "json"
+    """Plain JSON, or the DynamicSceneGraph of spark-dsg, which Hydra reads."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,13 +35,13 @@ class SemanticMapOptions(Printed):
 
 def run_scene_graph(args: SceneGraphOptions) -> None:
     from embodied.assets.cache import write_json
-    from embodied.datasets.scene_graph import scene_graph
+    from embodied.datasets.scene_graph import scene_graph, write_spark_dsg
     from embodied.house.house import House
     from embodied.navigation.graph import build_graph
 
     house = House.load(args.house / "house.json")
     facts = scene_graph(house, build_graph(house))
-    write_json(args.out, facts)
+    (write_json if args.form == "json" else lambda path, facts: write_spark_dsg(facts, path))(args.out, facts)
     counts = {"nodes": len(facts["nodes"]), "edges": len(facts["edges"]), "path": str(args.out)}
     show(args, counts, f"{counts['nodes']} nodes and {counts['edges']} edges of {house.name}: {args.out}")
 

@@ -1,7 +1,8 @@
-"""Continuous walks of an expert in `vln` data, for LeRobot, and goals of `goat` data."""
+"""Continuous walks of an expert in `vln` data, for published learners, and goals of `goat` data."""
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -23,10 +24,10 @@ class WalkOptions(OfData, Cached):
     width: Annotated[int, Option(video_side, "PIXELS")] = 256
     """Width and height of the pictures."""
     depth: bool = False
-    """Also write videos of depth."""
+    """Also write videos of depth (lerobot-vlnce)."""
 
 
-def run_walks(args: WalkOptions) -> None:
+def run_walks(form: str, args: WalkOptions) -> None:
     from embodied.datasets.habitat import route_episodes
     from embodied.datasets.store import dataset_of
     from embodied.datasets.vlnce import export_walks
@@ -36,9 +37,9 @@ def run_walks(args: WalkOptions) -> None:
     data = dataset_of(args.data, "vln")
     worlds = data_worlds(args.data, args.split, args.cache, None)
     walks = route_episodes(data.tasks(args.split), worlds)[: args.tasks]
-    how: dict[str, Any] = {"action_noise": args.action_noise, "depth": args.depth}
+    how: dict[str, Any] = {"action_noise": args.action_noise, "split": args.split, "depth": args.depth}
     how |= {"seed": data.config.seed, "camera": CameraConfig(args.width, args.width)}
-    steps = export_walks(args.out, walks, worlds, watch=lambda e: bar(e, "walks", "walk"), **how)
+    steps = export_walks(form, args.out, walks, worlds, watch=lambda e: bar(e, "walks", "walk"), **how)
     for world in worlds.values():
         world.close()
     facts = {"walks": len(walks), "steps": steps, "out": str(args.out)}
@@ -63,4 +64,5 @@ def run_goat(args: GoatOptions) -> None:
 
 
 register_export(Export("goat", GoatOptions, run_goat))
-register_export(Export("lerobot-vlnce", WalkOptions, run_walks))
+for _form in ("vlnce", "lerobot-vlnce"):
+    register_export(Export(_form, WalkOptions, functools.partial(run_walks, _form)))
