@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -10,7 +12,7 @@ from gymnasium.utils.env_checker import check_env
 from handmade import HandCatalogue, furnished
 
 from embodied.envs.continuous import POSITION
-from embodied.gym.lerobot import ENVS, make_env, make_one, sizes
+from embodied.gym.lerobot import ENVS, hub_file, make_env, make_one, sizes
 from embodied.gym.lerobot.drives import DRIVES, export_drives
 from embodied.seeds import stream
 from embodied.world import open_world
@@ -56,11 +58,15 @@ def test_a_policy_that_scores_the_experts_action_highest_succeeds(world):
     assert np.allclose(np.hypot(seen[-1][2], seen[-1][3]), 1, atol=1e-6)
 
 
-def test_the_hub_gets_the_environment(world, monkeypatch):
+def test_the_hubs_file_makes_the_environment(world, tmp_path, monkeypatch):
     from embodied.gym import continuous
 
     monkeypatch.setattr(continuous, "flat_worlds", lambda *_: {world.name: world})
-    envs = make_env(1, False, None, env="VLNCE", seed=4, **SMALL)["embodied/VLNCE-v0"][0]
+    hub_file(tmp_path / "env.py", "VLNCE", seed=4, **SMALL)
+    spec = importlib.util.spec_from_file_location("hub_env", tmp_path / "env.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    envs = module.make_env(n_envs=1, use_async_envs=False, cfg=None)["embodied/VLNCE-v0"][0]
     assert envs.reset(seed=0)[0]["pixels"].shape == (1, 32, 32, 3)
     with pytest.raises(ValueError, match="use one of"):
         make_env(env="Arena")

@@ -23,7 +23,7 @@ from typing import NoReturn
 from embodied.errors import UnableError
 
 COMMANDS = (
-    *("demo", "doctor", "assets", "house", "light", "render", "view", "dataset", "features", "corpus"),
+    *("demo", "doctor", "assets", "house", "light", "render", "rollout", "view", "dataset", "features", "corpus"),
     *("export", "train", "evaluate", "serve", "llm", "study", "bench", "cache"),
 )
 """Subcommands in the order `--help` lists them; each is a module with `run(options)`, or with commands of its own:

@@ -8,7 +8,7 @@ ObjectNav-v0 a score for each action, of which the largest is taken; in Drive-v0
 `observations=()` pixels are black. Every info has `is_success`; `task_description`, `task` and
 `_max_episode_steps` are attributes.
 
-For EnvHub, the file `env.py` of a repository has a `make_env` that calls this one.
+EnvHub reads a file `env.py` of a repository; `hub_file` writes one that makes these environments.
 """
 
 from __future__ import annotations
@@ -167,3 +167,16 @@ def make_one(env: str, **options: Any) -> gym.Env[Any, Any]:
     if env == "Drive":
         return DriveForLeRobot(drive.make(**options))
     return ContinuousForLeRobot(continuous.make(env.lower(), **options))
+
+
+def hub_file(path: Path, env: str = "VLNCE", **options: Any) -> None:
+    """Write the env.py of an EnvHub repository, which makes `env` with these options."""
+    text = f'''"""LeRobot's EnvHub: houses of `pip install embodied-houses`."""
+
+from embodied.gym import lerobot
+
+
+def make_env(n_envs=1, use_async_envs=False, cfg=None):
+    return lerobot.make_env(n_envs, use_async_envs, cfg, env={env!r}, **{options!r})
+'''
+    write_bytes(Path(path), text.encode())

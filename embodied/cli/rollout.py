@@ -1,0 +1,109 @@
+"""Run an agent on tasks of one house, and write videos and recordings.
+
+The camera of --video moves smoothly between viewpoints. With several episodes, %d in a file name stands for the number
+of the episode.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from embodied.cli.common import Furnished, Printed, bar, catalogue_of, check_machine, fetch, show
+from embodied.cli.recording import Filmed, Viewers, film, viewers_of
+from embodied.options import Count, CubeFace, HouseFolder, Option, drawn_as
+from embodied.render.photograph import CAMERAS
+from embodied.render.pictures import DRAWN, parse_pictures
+
+if TYPE_CHECKING:
+    from embodied.world import World
+
+
+AGENTS = ("shortest", "random", "forward10")
+"""As in embodied.policies.baselines, which --help should not import."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RolloutOptions(Filmed, Viewers, Furnished, Printed):
+    house: HouseFolder | None = None
+    """Folder that `embodied house` wrote (default: a house generated from --seed)."""
+    seed: int = 0
+    """Random seed of the house and its tasks."""
+    agent: Annotated[str, Option(words=AGENTS)] = "shortest"
+    """The agent."""
+    episodes: Count = 1
+    """Play N tasks."""
+    pictures: Annotated[str, drawn_as(DRAWN)] = "normal"
+    """How the house is drawn."""
+    size: CubeFace = 384
+    """Side of a panorama's cube face in pixels."""
+    camera: Annotated[str, Option(words=CAMERAS)] = "ideal"
+    """Camera of videos and recordings."""
+
+
+def run(args: RolloutOptions) -> None:
+    check_machine("unlit" if args.house else args.pictures)  # a house may be lit already
+    roll_out(args, viewers_of(args))
+
+
+def roll_out(args: RolloutOptions, viewers: tuple[str, ...]) -> None:
+    """Play, film and record; recordings also go to `viewers`."""
+    from embodied.envs.base import HelpEnv
+    from embodied.evaluation.rollout import play
+    from embodied.kinds.metrics import PER_EPISODE
+    from embodied.language import People
+    from embodied.policies.baselines import WITHOUT_LEARNING
+    from embodied.render.photograph import PhotoCamera
+    from embodied.tasks.find import find_pool, find_task
+    from embodied.viz.recording import PictureSizes, record_episode
+    from embodied.viz.sinks import Sinks
+
+    camera = PhotoCamera(args.camera, args.seed)
+    with world_of(args) as world:
+        fetch(world.catalogue, world.house)
+        pool = find_pool(world, seed=args.seed)
+        if args.episodes > len(pool):
+            raise ValueError(
+                f"house {world.name!r} has {len(pool)} tasks, asked for {args.episodes}; choose fewer or a larger house"
+            )
+        tasks = [find_task(pool, i, seed=args.seed, language=People()) for i in range(args.episodes)]
+        watched, agent = bar(tasks, "episodes", "episode"), WITHOUT_LEARNING[args.agent]()
+        episodes = play(lambda: HelpEnv({world.name: world}), agent, watched, seed=args.seed, agent=args.agent)
+        rows = []
+        for number, episode in enumerate(episodes):
+            row: dict[str, object] = {"task": episode.task.id, "request": episode.task.request}
+            row |= {name: float(f(episode, world.graph)) for name, f in PER_EPISODE.items()}
+            if args.video:
+                path = numbered(args.video, number, args.episodes)
+                row["video"] = str(film(world, episode, path, args.video_size, camera))
+            if args.rrd or viewers:
+                rrd = numbered(args.rrd, number, args.episodes) if args.rrd else None
+                watch = lambda steps: bar(steps, "recording", "step")
+                record_episode(world, episode, Sinks(rrd, viewers), pictures=PictureSizes(camera=camera), watch=watch)
+                row["recording"] = str(rrd or ", ".join(viewers))
+            rows.append(row)
+        facts = {"agent": args.agent, "seed": args.seed, "world": world.name, "renderer": world.fingerprint}
+        facts |= {"camera": args.camera, "episodes": rows}
+    lines = [f"{r['task']}  {'ok  ' if r['success'] else 'miss'} SPL {r['spl']:.2f}  {r['request']}" for r in rows]
+    show(args, facts, "\n".join(lines))
+
+
+def world_of(args: RolloutOptions) -> World:
+    """The world of --house, or of the generated house of --seed."""
+    from embodied.generate import generate_house
+    from embodied.world import open_folder, open_world
+
+    catalogue, drawn = catalogue_of(args), parse_pictures(args.pictures, args.size)
+    if args.house:
+        return open_folder(args.house, catalogue, args.cache, drawn)
+    house = generate_house(args.seed, catalogue=catalogue)
+    return open_world(house, catalogue, args.cache, drawn)
+
+
+def numbered(path: Path, number: int, total: int) -> Path:
+    """`path` with the episode's number in it: where %d stands, else before the suffix."""
+    if total == 1 and "%d" not in path.name:
+        return path
+    name = path.name if "%d" in path.name else f"{path.stem}-%d{path.suffix}"
+    return path.with_name(name.replace("%d", str(number)))
