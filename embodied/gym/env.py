@@ -398,12 +398,13 @@ def _sensor_of(play: Playground, wanted: EnvironmentSettings) -> Sensor:
         source = wanted.source if wanted.source is not None else encoder_entry().load()(store)
         sensors.append(FeatureSensor("features", source))
     if "oracle" in seen:
-        oracle = lambda name: _oracle_of(place_named(drawn, name))
+        oracle = functools.partial(_oracle_of, drawn)  # no lambda: environments are pickled
         sensors.append(FeatureSensor("oracle", FeatureTable(play.features, oracle)))
     return SensorSuite(sensors)
 
 
-def _oracle_of(world: World) -> np.ndarray:
+def _oracle_of(worlds: Mapping[str, World], name: str) -> np.ndarray:
+    world = place_named(worlds, name)
     return seen_features(world, world.catalogue, world.cache)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 
@@ -69,7 +68,7 @@ class FeatureTable:
         Raises:
           ValueError: another shape.
         """
-        self._with_doors = with_doors and functools.cache(with_doors)
+        self._with_doors, self._behind = with_doors, dict[str, np.ndarray]()
         self._rows = SightRows(worlds)
         self._table = self._rows.filled(worlds)
         self.size = self._rows.size
@@ -78,7 +77,9 @@ class FeatureTable:
         """(36, D) float32, read-only by convention; raises KeyError for a place of another world."""
         at = viewpoint(sight)
         if self._with_doors and at.world not in self._rows.spans:
-            return self._with_doors(at.world)[at.node]
+            if at.world not in self._behind:
+                self._behind[at.world] = self._with_doors(at.world)
+            return self._behind[at.world][at.node]
         return self._table[self._rows.row(sight)]
 
 

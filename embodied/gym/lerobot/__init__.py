@@ -14,12 +14,14 @@ EnvHub reads a file `env.py` of a repository; `hub_file` writes one that makes t
 from __future__ import annotations
 
 import functools
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from embodied.assets.cache import write_bytes
 from embodied.envs.continuous import POSITION
 from embodied.gym import continuous, drive
 from embodied.gym.driving import DriveSettings
