@@ -31,7 +31,7 @@ from embodied.world import gloss_of
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
 
-HOUSES, ROOMS_SHOWN = 4, 3
+LIGHT_HOUSES, ROOMS_SHOWN = 4, 3
 """How many houses are compared, and rooms of each."""
 VIEW_SIZE = (160, 240)
 """Height and width of the pictures."""
@@ -67,14 +67,14 @@ class Shot:
 def compare(
     catalogue: Catalogue, cache: Path, out: Path, *, seed: int = 1, progress: Callable[[str], None] = lambda text: None
 ) -> dict:
-    """Draw ROOMS_SHOWN rooms of each of HOUSES houses in every way, measure, and write light.json to `out`.
+    """Draw ROOMS_SHOWN rooms of each of LIGHT_HOUSES houses in every way, measure, and write light.json to `out`.
 
     Args:
       seed: of the first house; the others have the next ones, each at another time of day.
     """
     shots: list[Shot] = []
     kinds: list[str] = []
-    for k in range(HOUSES):
+    for k in range(LIGHT_HOUSES):
         hour, weather = TIMES[k % len(TIMES)]
         house = generate_house(seed + k, HouseConfig(area=FLAT_AREA, hour=hour, weather=weather), catalogue=catalogue)
         progress(
