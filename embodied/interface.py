@@ -269,7 +269,22 @@ class FindInTurn:
         return tuple(p for goal in self.goals for p in goal.placements)
 
 
-Goal = FindObject | FollowRoute | FindDescribed | GoTo | FindInTurn
+@dataclass(frozen=True)
+class AnswerQuestion:
+    """Find out something about the house and answer one of several options (embodied question answering)."""
+
+    form: str
+    """Kind of question."""
+    noun: str
+    """Class of the thing that it is about."""
+    options: tuple[str, ...]
+    answer: int
+    """Index of the right option."""
+    placements: tuple[str, ...]
+    """Things that the answer rests on."""
+
+
+Goal = FindObject | FollowRoute | FindDescribed | GoTo | FindInTurn | AnswerQuestion
 
 
 @dataclass(frozen=True)
