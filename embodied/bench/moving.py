@@ -9,7 +9,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
@@ -105,7 +105,8 @@ def compare(
         if not path.exists():
             facts = truth(s, known, cache, folder / f"{seed + k}.npz")
             write_json(path, judged(s, known, cache, facts, folder), indent=1)
-        rows += parse_file(path)
+        judged_house: Any = parse_file(path)
+        rows += judged_house
         progress(f"house {seed + k}: {path}")
     path = folder / "prices.json"
     if not path.exists():
