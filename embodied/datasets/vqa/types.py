@@ -15,11 +15,10 @@ from embodied.house.house import Placement
 from embodied.language.lexicon import UNFIT
 from embodied.language.plain_language import plural
 
-SIDE, ASIDE = 15.0, 60.0
-"""Degrees from the border between two sides within which nothing is asked; from a gaze, beyond which is out of view."""
-LEAST_METRES, MOST_METRES, NEARER, NEARER_METRES, BESIDE = 0.5, 8.0, 1.25, 0.3, 1.3
-"""Between things whose distance is asked for; how much farther the second nearest thing is than the nearest (times and
-metres); metres between a viewpoint and the thing that it is at."""
+SIDE = 15.0
+"""Degrees from the border between two sides within which nothing is asked."""
+LEAST_METRES, MOST_METRES, NEARER, NEARER_METRES = 0.5, 8.0, 1.25, 0.3
+"""Between things whose distance is asked for; how much farther the second nearest thing is than the nearest."""
 Sides = dict[str, tuple[float, float]]
 """Degrees to the left, from and to."""
 TWO_SIDES: Sides = {"left": (0, 180), "right": (-180, 0)}
