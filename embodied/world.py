@@ -110,7 +110,7 @@ class World:
           yaw: radians; as it is without.
 
         Raises:
-          ValueError: the house has no such thing.
+          ValueError: the house has no such thing, or the pose is not finite.
         """
         known = self.moment.moved.get(thing)
         if known is None and thing in self.house.placement_by_id:
@@ -118,8 +118,7 @@ class World:
             known = RigidPose.upright(p.position, p.yaw)
         x, y, z = (float(c) for c in position)
         pose = RigidPose.upright((x, y, z), known.yaw if yaw is None and known is not None else float(yaw or 0.0))
-        self._moments.append(self.moment)
-        self.show(dataclasses.replace(self.moment, moved={**self.moment.moved, thing: pose}))
+        self._next(moved={**self.moment.moved, thing: pose})
 
     def open(self, name: str, openness: float = 1.0) -> None:
         """Open a door, drawer or lid so far, 0 (closed) to 1 (of doors, a right angle); `undo` takes it back.
@@ -130,8 +129,7 @@ class World:
         Raises:
           ValueError: the house has nothing of this name that opens, or it cannot be open so far.
         """
-        self._moments.append(self.moment)
-        self.show(dataclasses.replace(self.moment, openness={**self.moment.openness, name: float(openness)}))
+        self._next(openness={**self.moment.openness, name: float(openness)})
 
     @functools.cached_property
     def openable(self) -> tuple[str, ...]:
@@ -150,9 +148,13 @@ class World:
           ValueError: the house has no such lamp.
         """
         lights = [x.id for x in self.house.lights if lamp in (x.id, x.placement)]
-        lamps = {**self.moment.lamps, **dict.fromkeys(lights or [lamp], bool(on))}
-        self._moments.append(self.moment)
-        self.show(dataclasses.replace(self.moment, lamps=lamps))
+        self._next(lamps={**self.moment.lamps, **dict.fromkeys(lights or [lamp], bool(on))})
+
+    def _next(self, **changed: Mapping[str, object]) -> None:
+        """Show the moment with these fields changed, and keep the one before for `undo`."""
+        before = self.moment
+        self.show(dataclasses.replace(before, **changed))  # type: ignore[arg-type]
+        self._moments.insert(-1, before)
 
     def undo(self) -> None:
         """Go back to the moment before the last `move`, `open` or `switch`; nothing where there was none."""

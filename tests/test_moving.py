@@ -62,6 +62,8 @@ def test_an_empty_moment_is_the_house_at_rest_and_a_door_opens_to_a_right_angle(
         (Moment(moved={"ghost_1": RigidPose((1.0, 1.0, 0.0))}), ValueError, "ghost_1"),
         (Moment(openness={"window_9": 0.5}), ValueError, "window_9"),
         (Moment(openness={"door_1": 1.5}), ValueError, "between 0"),
+        (Moment(moved={"rug_1": RigidPose((math.nan, 1.0, 0.0))}), ValueError, "finite"),
+        (Moment(moved={"rug_1": RigidPose((1.0, 1.0, 0.0), (0.0, 0.0, 0.0, 0.0))}), ValueError, "finite"),
         (Moment(moved={"rug_1": RigidPose((1.0, 1.0, 0.0), (0.9, 0.4, 0.0, 0.0))}), ValueError, "lean"),
         (Moment(moved={"rug_1": RigidPose((50.0, 1.0, 0.0))}), HouseError, "outside"),
     ],
@@ -69,6 +71,15 @@ def test_an_empty_moment_is_the_house_at_rest_and_a_door_opens_to_a_right_angle(
 def test_a_moment_that_a_house_cannot_have_is_refused_by_name(moment, error, words):
     with pytest.raises(error, match=words):
         moment.applied(HOUSE)
+
+
+def test_what_was_refused_is_not_undone(tmp_path):
+    with World(HOUSE, HandCatalogue(), build_graph(HOUSE), tmp_path) as unlit:
+        unlit.open("door_1", 0.5)
+        with pytest.raises(ValueError, match="between 0"):
+            unlit.open("door_1", 2.0)
+        unlit.undo()
+        assert unlit.moment.is_rest
 
 
 def test_a_pose_turns_points_as_its_quaternion_says():

@@ -104,7 +104,7 @@ class Moment:
         """Refuse a moment of another house.
 
         Raises:
-          ValueError: it names what the house does not have, or an openness outside 0 to 1.
+          ValueError: it names what the house does not have, an openness outside 0 to 1, or no pose.
         """
         doors = {o.id for o in house.openings if o.leaf_finish is not None}
         furniture = {o.partition("/")[0] for o in self.openness if "/" in o}
@@ -117,6 +117,9 @@ class Moment:
                 raise ValueError(f"house {house.name!r} has no {kind} {unknown}; it has {sorted(known)[:8]} ...")
         if wrong := {o: x for o, x in self.openness.items() if not 0 <= x <= 1}:
             raise ValueError(f"openness should lie between 0 (closed) and 1 (open), got {wrong}")
+        for name, pose in {**self.moved, **self.bodies}.items():
+            if not np.isfinite((*pose.position, *pose.quat)).all() or not any(pose.quat):
+                raise ValueError(f"{name!r} needs 3 finite metres and a quaternion w x y z, got {pose}")
 
     def open_parts(self, house: House) -> dict[str, dict[str, float]]:
         """How far parts of furniture are open that are not as the house has them, by placement id and part."""
