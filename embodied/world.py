@@ -134,7 +134,7 @@ class World:
     @functools.cached_property
     def openable(self) -> tuple[str, ...]:
         """Names of all that `open` takes."""
-        doors = (o.id for o in self.house.openings if o.leaf_finish is not None)
+        doors = (o.id for o in self.house.openings if o.opens)
         furniture = ((p.id, apart(self.catalogue.mesh, p)) for p in self.house.placements)
         return (*doors, *(f"{thing}/{m.name}" for thing, whole in furniture if whole for m in whole.moving))
 

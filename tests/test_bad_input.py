@@ -53,6 +53,7 @@ def said(capsys, *words: str) -> str:
         (("assets", "list", "--class", "zebra"), "no object class 'zebra'"),
         (("render", "/nowhere"), "house.json does not exist; make one with"),
         (("evaluate", "find", "--data", "/nowhere"), "build one with `embodied dataset"),
+        (("evaluate", "find", "--closed-doors", "nan"), "--closed-doors should be a share"),
         (("house", "--own", "/nowhere", "--out", "x"), "catalogue.json cannot be read"),
         (("bench", "nothing"), "unknown benchmark"),
         (("house", "--seed", "seven", "--out", "x"), "invalid int value: 'seven'; `embodied house --help` explains"),

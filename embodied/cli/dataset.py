@@ -32,7 +32,7 @@ SCALE_HELP = {name: described(name) for name in DATASET_SCALES}
 @dataclass(frozen=True, kw_only=True)
 class DatasetOptions(Furnished, Printed):
     kind: Annotated[str, Option(metavar="KIND", name="kind")]
-    """The kind of task: find, goat, vln, vnla, hanna, hari, MODULE:NAME of your own, from-people, or vqa."""
+    """The kind of task: find, goat, vln, vnla, hanna, hari, doors, MODULE:NAME of your own, from-people, or vqa."""
     out: OutputFolder
     """Folder of the data set."""
     scale: Annotated[str | None, Option(words=tuple(DATASET_SCALES), helps=SCALE_HELP)] = None

@@ -219,8 +219,9 @@ def parsed(args: EvaluateOptions) -> Evaluation:
         raise ValueError(f"trained agents need --data, a folder that `embodied dataset {args.kind}` built")
     if (args.assistant != TEMPLATE or args.ask_after) and kind.help == "none":
         raise ValueError(f"nobody is asked in tasks of kind {kind.name!r}; leave --assistant and --ask-after out")
-    if not 0 <= args.ask_after <= 1:
-        raise ValueError(f"--ask-after should be a share of the steps, 0 to 1, got {args.ask_after:g}")
+    for option, share in (("--ask-after", args.ask_after), ("--closed-doors", args.closed_doors)):
+        if not 0 <= share <= 1:
+            raise ValueError(f"{option} should be a share, 0 to 1, got {share:g}")
     splits = args.split or kind.test_splits
     if data is not None:
         for split in splits:

@@ -66,6 +66,8 @@ def evaluate(args: EvaluateOptions) -> None:
     of = {t: [q for q in questions if q.type == t] for t in dict.fromkeys(q.type for q in questions)}
     columns = {"chance": [chance(qs) for qs in of.values()]}
     if "blind" in (args.agent or ("blind",)):
+        if few := [t for t, qs in of.items() if len(qs) < 2]:
+            raise ValueError(f"blind models learn from half of a type's questions, and {few} have one; raise --tasks")
         columns |= {m: [float(cross_judged(m, qs, args.seed + 1)[0].mean()) for qs in of.values()] for m in BLIND}
     if "llm" in args.agent:
         answers = [*bar(answered(args, data, questions), "questions", "question", len(questions))]

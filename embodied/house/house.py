@@ -110,6 +110,11 @@ class Opening:
     angle: float = 0.0
     """How far a leaf stands open, radians; 0 is closed."""
 
+    @property
+    def opens(self) -> bool:
+        """True for a door with a leaf on hinges."""
+        return self.kind in ("door", "front_door", "back_door") and self.leaf_finish is not None
+
 
 @dataclass(frozen=True)
 class Placement:

@@ -106,11 +106,11 @@ class Moment:
         Raises:
           ValueError: it names what the house does not have, an openness outside 0 to 1, or no pose.
         """
-        doors = {o.id for o in house.openings if o.leaf_finish is not None}
+        doors = {o.id for o in house.openings if o.opens}
         furniture = {o.partition("/")[0] for o in self.openness if "/" in o}
         for kind, names, known in (
             ("things", {*self.moved, *furniture}, house.placement_by_id),
-            ("doors or windows", {o for o in self.openness if "/" not in o}, doors),
+            ("doors that open", {o for o in self.openness if "/" not in o}, doors),
             ("lights", self.lamps, {x.id for x in house.lights}),
         ):
             if unknown := sorted(set(names) - set(known)):
