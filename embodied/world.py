@@ -164,7 +164,14 @@ class World:
 
     def add(self, name: str, parts: Sequence[Part]) -> None:
         """Tell of a body that is no part of the house, such as a link of a robot: its parts, in its own frame. It is
-        drawn where `Moment.bodies` has it."""
+        drawn where `Moment.bodies` has it.
+
+        Raises:
+          ValueError: something of the house has this name, or the pictures are unlit, which show no bodies.
+        """
+        if name in self.owners or self.pictures.quality is None:
+            why = "something of the house has its name" if name in self.owners else "unlit pictures show no bodies"
+            raise ValueError(f"body {name!r} cannot be added: {why}")
         self._bodies[name] = tuple(dataclasses.replace(p, owner=name) for p in parts)
 
     def follow(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -214,7 +221,12 @@ class World:
 
         Args:
           hour: local solar time, in [0, 24).
+
+        Raises:
+          ValueError: there is no such hour.
         """
+        if not 0 <= hour < 24:
+            raise ValueError(f"hour should lie in [0, 24), got {hour}")
         house = dataclasses.replace(self.house, sky=dataclasses.replace(self.house.sky, hour=hour))
         return World(house, self.catalogue, self.graph, self.cache, self.pictures)
 

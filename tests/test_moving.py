@@ -74,13 +74,19 @@ def test_a_moment_that_a_house_cannot_have_is_refused_by_name(moment, error, wor
         moment.applied(HOUSE)
 
 
-def test_what_was_refused_is_not_undone(tmp_path):
+def test_what_a_world_refuses_is_not_undone(tmp_path):
     with World(HOUSE, HandCatalogue(), build_graph(HOUSE), tmp_path) as unlit:
         unlit.open("door_1", 0.5)
         with pytest.raises(ValueError, match="between 0"):
             unlit.open("door_1", 2.0)
         unlit.undo()
         assert unlit.moment.is_rest
+        with pytest.raises(ValueError, match="show no bodies"):
+            unlit.add("robot", [])
+        with pytest.raises(ValueError, match="hour"):
+            unlit.at(math.nan)
+    with World(HOUSE, HandCatalogue(), build_graph(HOUSE), tmp_path, _tiny()) as lit, pytest.raises(ValueError):
+        lit.add(thing(), [])
 
 
 def test_a_pose_turns_points_as_its_quaternion_says():
