@@ -202,7 +202,8 @@ class World:
           slack: metres, and thrice as many radians, that something may move until its light is computed anew.
 
         Raises:
-          ValueError: the moment is not of this house, or it is drawn by tracing rays, which knows the house at rest.
+          ValueError: the moment is not of this house, or it is drawn by tracing rays, which knows the house at rest, or
+            furniture is both moved and open in lit pictures.
         """
         moment.check(self.house)
         if moment.open_parts(self.house) and (
@@ -213,8 +214,12 @@ class World:
             raise ValueError(f"bodies {unknown} are unknown; tell of them by World.add first")
         if isinstance(self.pictures, Traced):
             raise ValueError("ray-traced pictures show a house at rest: open a world of moment.applied(house)")
-        self._moments[-1] = moment
-        self._bring_up_to_date(slack)
+        before, self._moments[-1] = self.moment, moment
+        try:
+            self._bring_up_to_date(slack)
+        except ValueError:
+            self._moments[-1] = before
+            raise
 
     def at(self, hour: float) -> World:
         """The same house at rest at another hour: a world of its own, with light of its own.

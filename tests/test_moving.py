@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import mujoco
 import numpy as np
@@ -74,11 +75,15 @@ def test_a_moment_that_a_house_cannot_have_is_refused_by_name(moment, error, wor
         moment.applied(HOUSE)
 
 
-def test_what_a_world_refuses_is_not_undone(tmp_path):
+def test_what_a_world_refuses_is_not_undone(tmp_path, monkeypatch):
     with World(HOUSE, HandCatalogue(), build_graph(HOUSE), tmp_path) as unlit:
         unlit.open("door_1", 0.5)
         with pytest.raises(ValueError, match="between 0"):
             unlit.open("door_1", 2.0)
+        with monkeypatch.context() as m, pytest.raises(ValueError, match="drawn"):
+            m.setattr(unlit, "_bring_up_to_date", Mock(side_effect=ValueError("cannot be drawn")))
+            unlit.move(thing(), (1.0, 1.0, 0.0))
+        assert unlit.moment == Moment(openness={"door_1": 0.5})
         unlit.undo()
         assert unlit.moment.is_rest
         with pytest.raises(ValueError, match="show no bodies"):
