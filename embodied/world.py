@@ -16,7 +16,7 @@ from embodied import gl
 from embodied.assets.cache import default_cache, digest
 from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
-from embodied.house.house import House
+from embodied.house.house import HINGED, House
 from embodied.house.lighting import load_lit_house
 from embodied.house.moment import Moment, RigidPose, apart
 from embodied.interface import Sighting
@@ -112,10 +112,7 @@ class World:
         Raises:
           ValueError: the house has no such thing, or the pose is not finite.
         """
-        known = self.moment.moved.get(thing)
-        if known is None and thing in self.house.placement_by_id:
-            p = self.house.placement_by_id[thing]
-            known = RigidPose.upright(p.position, p.yaw)
+        known = self.moment.moved.get(thing) or self.house.placement_by_id.get(thing)
         x, y, z = (float(c) for c in position)
         pose = RigidPose.upright((x, y, z), known.yaw if yaw is None and known is not None else float(yaw or 0.0))
         self._next(moved={**self.moment.moved, thing: pose})
@@ -134,7 +131,7 @@ class World:
     @functools.cached_property
     def openable(self) -> tuple[str, ...]:
         """Names of all that `open` takes."""
-        doors = (o.id for o in self.house.openings if o.opens)
+        doors = (o.id for o in self.house.openings if o.kind in HINGED and o.leaf_finish is not None)
         furniture = ((p.id, apart(self.catalogue.mesh, p)) for p in self.house.placements)
         return (*doors, *(f"{thing}/{m.name}" for thing, whole in furniture if whole for m in whole.moving))
 
@@ -164,14 +161,9 @@ class World:
 
     def add(self, name: str, parts: Sequence[Part]) -> None:
         """Tell of a body that is no part of the house, such as a link of a robot: its parts, in its own frame. It is
-        drawn where `Moment.bodies` has it.
-
-        Raises:
-          ValueError: something of the house has this name, or the pictures are unlit, which show no bodies.
-        """
+        drawn where `Moment.bodies` has it, in lit pictures, and needs a name that nothing in the house has."""
         if name in self.owners or self.pictures.quality is None:
-            why = "something of the house has its name" if name in self.owners else "unlit pictures show no bodies"
-            raise ValueError(f"body {name!r} cannot be added: {why}")
+            raise ValueError(f"body {name!r} needs a name of its own, and lit pictures: unlit ones show no bodies")
         self._bodies[name] = tuple(dataclasses.replace(p, owner=name) for p in parts)
 
     def follow(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -202,13 +194,11 @@ class World:
           slack: metres, and thrice as many radians, that something may move until its light is computed anew.
 
         Raises:
-          ValueError: the moment is not of this house, or it is drawn by tracing rays, which knows the house at rest, or
-            furniture is both moved and open in lit pictures.
+          ValueError: the moment is not of this house, or cannot be drawn: by rays, or furniture lit, moved and open.
         """
         moment.check(self.house)
-        if moment.open_parts(self.house) and (
-            unknown := sorted({n for n in moment.openness if "/" in n} - {*self.openable})
-        ):
+        parts = {n for n in moment.openness if "/" in n}
+        if unknown := sorted(parts - {*self.openable} if parts else ()):
             raise ValueError(f"{self.house.name!r} has nothing called {unknown} that opens; World.openable names all")
         if unknown := sorted(set(moment.bodies) - set(self._bodies)):
             raise ValueError(f"bodies {unknown} are unknown; tell of them by World.add first")
@@ -226,9 +216,6 @@ class World:
 
         Args:
           hour: local solar time, in [0, 24).
-
-        Raises:
-          ValueError: there is no such hour.
         """
         if not 0 <= hour < 24:
             raise ValueError(f"hour should lie in [0, 24), got {hour}")

@@ -33,6 +33,7 @@ OPENING_KINDS = ("door", "passage", "front_door", "back_door", "window", "french
 WEATHERS = ("clear", "hazy", "overcast")
 LANDSCAPES = ("suburb", "village", "street", "roofs", "lake", "fields", "forest")
 SEASONS = ("spring", "summer", "autumn", "winter")
+HINGED = ("door", "front_door", "back_door")
 DOORS = ("door", "passage", "front_door", "back_door", "french_window", "garage_door")
 """Opening kinds that a person can walk through."""
 
@@ -109,11 +110,6 @@ class Opening:
     """The jamb, 'a' or 'b', that carries the hinges."""
     angle: float = 0.0
     """How far a leaf stands open, radians; 0 is closed."""
-
-    @property
-    def opens(self) -> bool:
-        """True for a door with a leaf on hinges."""
-        return self.kind in ("door", "front_door", "back_door") and self.leaf_finish is not None
 
 
 @dataclass(frozen=True)

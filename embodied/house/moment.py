@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from embodied.assets.moving_parts import OPEN, TakenApart, closed, openness_of, taken_apart
 from embodied.assets.records import MeshPart
 from embodied.geometry import rotation
-from embodied.house.house import House, HouseError, Light, Placement
+from embodied.house.house import HINGED, House, HouseError, Light, Placement
 from embodied.house.shapes import room_at
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -106,7 +106,7 @@ class Moment:
         Raises:
           ValueError: it names what the house does not have, an openness outside 0 to 1, or no pose.
         """
-        doors = {o.id for o in house.openings if o.opens}
+        doors = {o.id for o in house.openings if o.kind in HINGED and o.leaf_finish is not None}
         furniture = {o.partition("/")[0] for o in self.openness if "/" in o}
         for kind, names, known in (
             ("things", {*self.moved, *furniture}, house.placement_by_id),

@@ -102,6 +102,8 @@ def lit_house(args: HouseOptions) -> tuple[House, Catalogue, LitPages | None]:
     catalogue = catalogue_of(args)
     house = load_lit_house(args.house, catalogue)
     moment = Moment() if args.moment is None else load_json(args.moment, Moment)
+    if moment.bodies:
+        raise ValueError(f"--moment has bodies that are no part of the house: leave {sorted(moment.bodies)} out")
     if args.light == "none":
         return moment.applied(house), catalogue, None
     if not moment.is_rest:
