@@ -124,7 +124,8 @@ def test_every_viewpoint_of_the_graphs_has_features_and_view_k_is_matterports(pr
 @pytest.mark.parametrize("program", KINDS)
 def test_the_readme_says_what_to_run_and_which_lines_to_change(program, folders):
     text = (folders / program / "README-embodied.md").read_text()
-    assert all(words in text for words in ("python -m embodied.mattersim", "commit", "PyTorch"))
+    assert ("python -m embodied.mattersim" in text) != (program == "vnla"), "whose release of the simulator is compiled"
+    assert "commit" in text and "PyTorch" in text
     assert "$" not in text.replace("$ ", "")
     assert program in ("duet", "iliad-nav") or re.search(r"at most \d+ episodes", text)
     assert ("not a ViT's" if program == "duet" else "not a ResNet-152's") in text

@@ -128,18 +128,19 @@ def look(args: ViewOptions) -> None:
 def sheet(data: VqaData, question: VqaQuestion, columns: int = 4, line: int = 24) -> np.ndarray:
     """(h, w, 3) BGR: a question and its answer, above frames of its walk: evenly spaced ones, and the one that shows
     each thing best that it is about, outlined."""
+    from embodied.datasets.vqa.walks import read_frame
     from embodied.house.house import House
 
     files = data.frames(question.walk)
     house = House.load(files[0].parents[1] / "house.json")
     number = {p.id: i + 1 for i, p in enumerate(house.placements)}
     outlined = [(name, number[name], c) for name, c in zip(question.about, COLOURS) if name in number]
-    ids = [np.asarray(cv2.imread(str(f.with_suffix(".png")), -1)) for f in files]
+    ids = [read_frame(f.with_suffix(".png"), cv2.IMREAD_UNCHANGED) for f in files]
     best = {max(range(len(ids)), key=lambda k: (ids[k] == i).sum()) for _, i, _ in outlined}
     say = lambda on, text, x, y, colour=(0, 0, 0): cv2.putText(on, text[:230], (x, y), 0, 0.5, colour, 1, cv2.LINE_AA)
     pictures = []
     for k in sorted(best | {*np.linspace(0, len(files) - 1, columns).astype(int).tolist()}):
-        picture = say(np.asarray(cv2.imread(str(files[k]))), str(k), 6, 352, (255, 255, 255))
+        picture = say(read_frame(files[k]), str(k), 6, 352, (255, 255, 255))
         for _, i, colour in outlined:
             edges, _ = cv2.findContours((ids[k] == i).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
             cv2.drawContours(picture, edges, -1, colour, 2)

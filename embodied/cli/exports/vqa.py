@@ -62,14 +62,13 @@ def run_vqa(args: VqaExportOptions) -> None:
 def write_video(frames: list[Path], path: Path) -> None:
     """Write pictures as MP4."""
     import av
-    import cv2
-    import numpy as np
 
     from embodied.assets.cache import atomic_path
+    from embodied.datasets.vqa.walks import read_frame
 
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
-        pictures, stream = [np.asarray(cv2.imread(str(f))) for f in frames], container.add_stream("libx264", rate=FPS)
+        pictures, stream = [read_frame(f) for f in frames], container.add_stream("libx264", rate=FPS)
         (stream.height, stream.width), stream.pix_fmt = pictures[0].shape[:2], "yuv420p"
         for picture in pictures:
             container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))

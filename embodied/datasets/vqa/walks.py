@@ -11,10 +11,12 @@ import cv2
 import numpy as np
 import shapely
 
+from embodied.assets.archives import read_picture
 from embodied.assets.cache import write_bytes
 from embodied.geometry import rectangle, wrap
 from embodied.house.house import House, Placement
 from embodied.navigation.graph import NavGraph
+from embodied.records import RecordError
 from embodied.render.camera import camera_at
 from embodied.world import World
 
@@ -97,6 +99,18 @@ def film(world: World, track: Sequence[Camera], folder: Path) -> Iterator[WalkFr
         clear = (o for o in large if shares[o] >= WHOLE * outline(things[o], position, yaw))
         x, y, z = (round(float(c), 3) for c in position)
         yield WalkFrame((x, y, z), round(yaw, 4), shares, tuple(sorted(clear)))
+
+
+def read_frame(path: Path, mode: int = cv2.IMREAD_COLOR) -> np.ndarray:
+    """The picture of a file of a walk.
+
+    Raises:
+      RecordError: it is missing or damaged.
+    """
+    picture = read_picture(path, mode)
+    if picture is None:
+        raise RecordError(f"{path} is no whole picture; build the data set again")
+    return picture
 
 
 def shares_of(world: World, ids: np.ndarray) -> dict[str, float]:
