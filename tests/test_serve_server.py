@@ -181,7 +181,8 @@ def test_the_caddyfile_of_the_tutorial_serves_a_study_behind_tls(folder, tmp_pat
     (tmp_path / "Caddyfile").write_text(text)
     env = {"HOME": str(tmp_path), "XDG_DATA_HOME": str(tmp_path), "PATH": "/usr/bin:/bin"}
     command = ["caddy", "run", "--config", str(tmp_path / "Caddyfile"), "--adapter", "caddyfile"]
-    caddy = subprocess.Popen(command, env=env, stderr=subprocess.PIPE)
+    log = tmp_path / "caddy.log"  # a file: a pipe that nobody reads stops it when full
+    caddy = subprocess.Popen(command, env=env, stderr=log.open("wb"))
     try:
         lax = ssl.create_default_context()
         lax.check_hostname, lax.verify_mode = False, ssl.CERT_NONE  # its certificate is its own here
@@ -191,16 +192,18 @@ def test_the_caddyfile_of_the_tutorial_serves_a_study_behind_tls(folder, tmp_pat
                     assert answer.read() == b"ok"
                 break
             except (OSError, urllib.error.URLError):
-                assert caddy.poll() is None, caddy.stderr.read().decode()
+                assert caddy.poll() is None, log.read_text()
                 time.sleep(0.1)
         for at in ("/", "/static/app.js"):
             with urllib.request.urlopen(address + at, context=lax, timeout=5) as answer:
                 assert answer.status == 200
-        with connect(address.replace("https", "wss") + "/ws", origin=address, ssl=lax) as ws:
+        with connect(address.replace("https", "wss") + "/ws", origin=address, ssl=lax, open_timeout=300) as ws:
             ws.send(json.dumps({"join": server.word}))
-            assert "token" in json.loads(ws.recv(10))
-        with connect(address.replace("https", "wss") + "/ws", origin="https://evil.example", ssl=lax) as ws:
-            assert json.loads(ws.recv(10))["screen"] == "refused"
+            assert "token" in json.loads(ws.recv(300))
+        with connect(
+            address.replace("https", "wss") + "/ws", origin="https://evil.example", ssl=lax, open_timeout=300
+        ) as ws:
+            assert json.loads(ws.recv(300))["screen"] == "refused"
     finally:
         caddy.terminate()
         server.stop()
