@@ -85,11 +85,12 @@ def demonstrate(args: DemoOptions, viewers: tuple[str, ...]) -> None:
         with timed("the second task: ask for help", seconds):
             help_facts = ask_for_help(args, world, routes, viewers)
         with timed("a door closes and opens", seconds):
-            film_a_door(args.out / "door.mp4", world)
+            door = film_a_door(args.out / "door.mp4", world)
         facts: dict[str, object] = {"walk": walk, "help": help_facts, "plan": str(args.out / "plan.png")}
         facts |= {"seconds": seconds, "renderer": world.fingerprint["renderer"]}
     look = f"look at a recording with: rerun {help_facts['recording']}"
-    show(args, facts, "\n".join([told(walk), told(help_facts), f"floor plan  {facts['plan']}", look]))
+    lines = [told(walk), told(help_facts), f"floor plan  {facts['plan']}", *([f"a door  {door}"] if door else []), look]
+    show(args, facts, "\n".join(lines))
 
 
 SMALL_FLAT = (32.0, 36.0)
@@ -185,8 +186,8 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route], viewe
     return recorded(world, episode, args.out / "help.rrd", viewers, eyes=world, recognise=recognise)
 
 
-def film_a_door(path: Path, world: World) -> None:
-    """Film how the door that is seen best from a viewpoint closes and opens again."""
+def film_a_door(path: Path, world: World) -> Path | None:
+    """Film how the door that is seen best from a viewpoint closes and opens again; None where no door is seen."""
     import numpy as np
 
     from embodied.cli.recording import VIDEO_ANGLE
@@ -203,8 +204,7 @@ def film_a_door(path: Path, world: World) -> None:
                 seen = int((ids == world.owners.index(f"{o.id}/leaf") + 1).sum())
                 best, pose = max((best, pose), (seen, (o.id, node, yaw)), key=lambda pair: pair[0])
     if pose is None:
-        note("no viewpoint of this house sees a door")
-        return
+        return None
     door, node, yaw = pose
 
     def frames() -> Iterator[np.ndarray]:
@@ -214,6 +214,7 @@ def film_a_door(path: Path, world: World) -> None:
 
     write_video(path, frames(), DOOR_SIZE)
     world.show(Moment())
+    return path
 
 
 def recorded(
