@@ -21,7 +21,7 @@ from embodied.light.tracing.emitters import Lamp
 LAMP_RAYS = 24
 """Rays of a place to a lamp."""
 BULB = 0.06
-"""Metres before a bare bulb at which rays end."""
+"""Metres before a bare bulb at which rays end, and square metres of the least squared distance from it."""
 
 Blocked: TypeAlias = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """From starts (n, 3), unit directions (n, 3) and metres (n,): (n,) bool, something is met nearer than that."""

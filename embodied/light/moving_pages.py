@@ -80,7 +80,7 @@ class HousePages:
         self._hiding: dict[str, _Hides] = {}
         self._opens: dict[Tile, tuple[np.ndarray, np.ndarray]] = {}
         self._sunlit: dict[int, np.ndarray] = {}
-        self._lamp_tiles: dict[str, _Hides] = {}
+        self._lamplit: _Hides | None = None
         self._burning: list[tuple[Lamp, Blocked]] = []
         self._sent_back: dict[str, SentBack] = {}
         self._carried = by_carrier({x.id: x for x in self.lamps}, carriers)
@@ -293,7 +293,7 @@ class HousePages:
           slack: as MovingHouse.show has it.
         """
         every = [*things.values()]
-        if not self._carried or (LAMPS in self._lamp_tiles and self._lamp_tiles[LAMPS].holds(every, slack)):
+        if not self._carried or (self._lamplit is not None and self._lamplit.holds(every, slack)):
             return False
         self._burning = []
         for root, lamps in self._carried.items():
@@ -301,7 +301,7 @@ class HousePages:
                 own = None if lamp.normals.any() else things[root]
                 self._burning.append((lamp, self._blocked([t for t in every if t is not own])))
         light = self._shone_on()
-        self._lamp_tiles = {LAMPS: _Hides(tuple(every), light, frozenset(light))}
+        self._lamplit = _Hides(tuple(every), light, frozenset(light))
         return True
 
     def _shone_on(self) -> dict[Tile, np.ndarray]:
@@ -367,10 +367,9 @@ class HousePages:
         before = [self._hiding.pop(n) for n in [*self._hiding] if n in moved or n not in (*groups, LAMPS)]
         self._hiding |= {name: self._hides(groups[name]) for name in moved}
         about = [*before, *(self._hiding[name] for name in moved)]
-        if self._lamp_tiles.get(LAMPS) is not self._hiding.get(LAMPS):
-            about += [self._hiding[LAMPS]] if LAMPS in self._hiding else []
-            self._hiding |= self._lamp_tiles
-            about += [self._hiding[LAMPS]]
+        if self._lamplit is not None and self._lamplit is not (lit_before := self._hiding.get(LAMPS)):
+            about += [self._lamplit] if lit_before is None else [self._lamplit, lit_before]
+            self._hiding[LAMPS] = self._lamplit
         if not self._shown:
             about = [*self._hiding.values()]
         tiles = {tile for hides in about for tile in (*hides.tiles, *hides.direct)}
