@@ -7,6 +7,7 @@ nothing with a checksum may be. Small files that unpack to much, or nest deeply,
 from __future__ import annotations
 
 import dataclasses
+import functools
 import gzip
 import itertools
 import json
@@ -40,7 +41,7 @@ from embodied.agents.common.weights import WEIGHTS_FORMAT, load_weights
 from embodied.agents.hanna.agent import HannaAbout, HannaAgent
 from embodied.agents.hanna.training_config import HANNA_SCALES
 from embodied.agents.hari import agent as hari
-from embodied.agents.iliad.nav.stages import config_of
+from embodied.agents.iliad.nav.stages import load_follower
 from embodied.agents.iliad.regex.run import load_student
 from embodied.agents.vision.config import PLAIN
 from embodied.agents.vision.features import load_features, save_features
@@ -411,7 +412,7 @@ def _bandit(path: Path) -> object:
         (hari.load_agent, "vnla", "{}", "holds 'vnla', 'hari' is wanted"),
         (_bandit, "bandit", '{"config": {}}', "lacks the field"),
         (load_student, "regex", '{"config": {"stages": 3}, "words": []}', "unknown field"),
-        (config_of, "nav", '{"config": {}}', "lacks the field"),
+        (functools.partial(load_follower, eyes=None), "nav", '{"config": {}}', "lacks the field"),
     ],
 )
 def test_weights_beside_settings_that_cannot_be_are_refused(read, kind, about, match, tmp_path):

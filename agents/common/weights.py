@@ -12,9 +12,11 @@ from torch import Tensor, nn
 
 from embodied.agents.common.tensor_file import checksum_of, load_tensors, save_tensors
 from embodied.identity import Identity
-from embodied.records import from_json, parse, to_json
+from embodied.records import from_plain, parse, to_json
 
 WEIGHTS_FORMAT = "embodied-weights-1"
+RETIRED = ("varied_words",)
+"""Settings of earlier versions that files may hold and that change nothing."""
 T = TypeVar("T")
 
 
@@ -46,7 +48,10 @@ def load_weights(path: Path, kind: str, about: type[T], remedy: str) -> tuple[di
     if metadata.get("kind") != kind:
         raise ValueError(f"{path}: holds {metadata.get('kind')!r}, {kind!r} is wanted; {remedy}")
     try:
-        return tensors, from_json(about, metadata.get("about", ""))
+        value = parse(metadata.get("about", ""), f"a {about.__name__}")
+        if isinstance(value, dict) and isinstance(config := value.get("config"), dict):
+            value["config"] = {name: x for name, x in config.items() if name not in RETIRED}
+        return tensors, from_plain(about, value)
     except ValueError as e:
         raise ValueError(f"{path}: {e}; {remedy}") from e
 

@@ -80,9 +80,9 @@ class PretrainedVocabulary(Vocabulary):
         return vector / vector.norm()
 
 
-def vocabulary_with(words: tuple[str, ...], vectors: str, reword: Callable[[str], str] | None = None) -> Vocabulary:
-    """The vocabulary of an agent whose setting `word_vectors` is `vectors`; `reword` as Vocabulary has it."""
-    return Vocabulary(words, reword) if vectors == LEARNED_WORDS else PretrainedVocabulary(words, reword)
+def vocabulary_with(words: tuple[str, ...], vectors: str) -> Vocabulary:
+    """The vocabulary of an agent whose setting `word_vectors` is `vectors`."""
+    return Vocabulary(words) if vectors == LEARNED_WORDS else PretrainedVocabulary(words)
 
 
 class WordEmbedding(nn.Embedding):

@@ -9,7 +9,7 @@ loss = L_main + L_ask  (4.9, 4.10, 4.13, 4.14)            (losses)
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Unpack
 
@@ -65,11 +65,11 @@ class HannaLearner(imitation.ImitationLearner):
         return imitation.BatchLoss(losses, losses[0] + losses[1] if c.ask_rule == "learned" else losses[0], numbers)
 
 
-def vocabulary_of(data: Dataset, houses: int | None = None, reword: Callable[[str], str] | None = None) -> Vocabulary:
+def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
     """Words of the training split's first `houses` houses: requests and the routes that training hears."""
     names = data.names("train")[:houses]
     routes = [r.instruction for n in names for r in data.routes(n) if r.split == "train_seen"]
-    return build_vocabulary([*(t.request for t in data.tasks("train") if t.world in names), *routes], 2, reword)
+    return build_vocabulary([*(t.request for t in data.tasks("train") if t.world in names), *routes], 2)
 
 
 def train_agent(
@@ -80,11 +80,11 @@ def train_agent(
     **options: Unpack[imitation.Options],
 ) -> Progress:
     """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
-    houses, reword = config.training_houses or None, source.rewording(config)
+    houses = config.training_houses or None
     training = source.split("train", houses=houses)
     validation = source.split("val_unseen", limit=config.validation_tasks)
-    words = vocabulary_of(source.data, houses, reword)
-    agent = HannaAgent.new(source.about(HannaAbout, config, evaluation, words), reword)
+    words = vocabulary_of(source.data, houses)
+    agent = HannaAgent.new(source.about(HannaAbout, config, evaluation, words))
     agent.network.to(source.device)
     identity = identity_of("embodied.agents.hanna.run", settings=config, **source.identity())
     return imitation.train(HannaLearner(agent, training, HannaTeacher()), validation, folder, identity, **options)

@@ -15,7 +15,6 @@ from embodied.agents.hanna.run import train_agent
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.studies.wordings import hearing, words_table
 from embodied.agents.vision.sighted_study import TEST_SPLITS as TEST
 from embodied.agents.vision.sighted_study import SightedStudy
 from embodied.agents.vision.training_data import TrainingData
@@ -69,7 +68,6 @@ HANNA_TABLES: Mapping[str, StudyTable] = {
         FULL,
         TEST,
     ),
-    "words": words_table(learned, FULL, TEST[1:]),
     "4.4": StudyTable("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
     "4.5": StudyTable(
         "Help-request policies",
@@ -117,7 +115,7 @@ def in_both_ways(table: StudyTable) -> StudyTable:
 
 @dataclass(frozen=True, kw_only=True)
 class HannaStudy(SightedStudy):
-    """Tables 4.3 to 4.6 and D.2, and that of unheard words."""
+    """Tables 4.3 to 4.6 and D.2."""
 
     config: TrainingConfig
     evaluation: HannaEvaluation
@@ -149,8 +147,7 @@ class HannaStudy(SightedStudy):
             return super().policies(agent, judge, split)
         bank = self.training_data().split(split.removesuffix(SHIPPED)).bank
         by_text = judge.get(BY_TEXT) and not split.endswith(SHIPPED)
-        policy = hanna_policies(agent, bank, by_the_text if by_text else HannaAgent.policy)[judge["played"]]
-        return hearing(policy, judge, agent.about.words, self.cache)
+        return hanna_policies(agent, bank, by_the_text if by_text else HannaAgent.policy)[judge["played"]]
 
     def where(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
         return super().where(agent, judge, split.removesuffix(SHIPPED))

@@ -19,7 +19,6 @@ from embodied.agents.iliad.training import episodes_to
 from embodied.agents.iliad.training import train as learn
 from embodied.agents.studies.engine import Measured, StudyLearner
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
-from embodied.agents.studies.wordings import code_of, words_table
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
 
@@ -31,7 +30,7 @@ LEARNING_ROWS = (
     StudyRow("ADEL"),
 )
 DAGGER, BLIND_STUDENT = LEARNING_ROWS[0], StudyRow("DAgger, blind", {"learner": "dagger", "blind": True})
-OWN = ("blind", "word_vectors", "varied_words")
+OWN = ("blind",)
 """Settings of NAV's students in which rows differ."""
 CHANCE = StudyRow("chance: a random shortest path of 2 to 6 edges", None)
 
@@ -80,11 +79,11 @@ class IliadStudy(StudyLearner):
 
     def tables(self) -> Mapping[str, StudyTable]:
         """REGEX is judged on its validation split, too; NAV's is that of which the best of many students was kept. In
-        NAV one can be blind, arrive by chance, and hear what one never heard."""
+        NAV one can be blind, and arrive by chance."""
         if self.setup.name == "nav":
             rows = (*LEARNING_ROWS, BLIND_STUDENT, CHANCE)
             seen = dataclasses.replace(ILIAD_TABLES["3.4"], rows=rows, compared=((DAGGER, BLIND_STUDENT),))
-            return {**ILIAD_TABLES, "3.4": seen, "words": words_table(_reader, ("success",), ("test",))}
+            return {**ILIAD_TABLES, "3.4": seen}
         both = lambda t: dataclasses.replace(t, splits=("validation", "test")) if t.pooled else t
         return {name: both(table) for name, table in ILIAD_TABLES.items()}
 
@@ -114,7 +113,7 @@ class IliadStudy(StudyLearner):
         return home / "best.safetensors"
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        return {"threshold": self.config.threshold, **self.setup.source(), **code_of(row.judge)}
+        return {"threshold": self.config.threshold, **self.setup.source()}
 
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         grounds = _grounds(self.setup, folder)
@@ -124,7 +123,7 @@ class IliadStudy(StudyLearner):
         if row.judge.get("curve"):
             return {f"success at {h['episodes']:g}": Samples((h["success"],)) for h in history}
         needed = episodes_to(history, self.config.threshold) / 1000
-        values = {"success": grounds.judge(weights, split, row.judge)}
+        values = {"success": grounds.judge(weights, split)}
         return values | ({NEEDED: Samples((math.nan if math.isinf(needed) else needed,))} if split == "test" else {})
 
     def about(self) -> str:
@@ -134,10 +133,6 @@ class IliadStudy(StudyLearner):
             f"(REINFORCE a tenth); seeds {', '.join(map(str, self.repeats))}. The threshold is a validation success of "
             f"{100 * x.threshold:g} %; n seeds reached it."
         )
-
-
-def _reader(label: str, **train: Any) -> StudyRow:
-    return StudyRow(label, {"learner": "dagger", **train})
 
 
 def _own(train: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from embodied.options import Count, Settings
 if TYPE_CHECKING:
     from embodied.agents.studies.engine import StudyLearner
 
-WORDLESS = ("instruction_length", "word_vectors", "varied_words")
+WORDLESS = ("instruction_length", "word_vectors")
 """Of the settings of agents, those that an agent that is told a class has no use for."""
 
 

@@ -12,7 +12,6 @@ from embodied.agents.common.settings import EvaluationSettings, ImitationSetting
 from embodied.agents.common.sighted import SightedAgent
 from embodied.agents.studies.episodes import EpisodeStudy
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.studies.wordings import code_of, hearing
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.training_data import TrainingData
@@ -90,12 +89,8 @@ class SightedStudy(FeatureStudy):
         agent = self.agent_kind.load(weights)
         return dataclasses.replace(agent, about=dataclasses.replace(agent.about, evaluation=self.evaluation))
 
-    def policies(self, agent: Any, judge: Mapping[str, Any], split: str) -> Agent:
-        policy = super().policies(agent, judge, split)
-        return policy if agent is None else hearing(policy, judge, agent.about.words, self.cache)
-
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        return {**super().judged(row, split), "evaluation": self.evaluation, **code_of(row.judge)}
+        return {**super().judged(row, split), "evaluation": self.evaluation}
 
     def about(self) -> str:
         c, drawn = self.config, self.training_data().pictures("train")

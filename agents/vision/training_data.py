@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from embodied.agents.common.paraphrases import varied
 from embodied.agents.common.playing import TaskSet
 from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
 from embodied.agents.common.sighted import About
@@ -21,7 +20,6 @@ from embodied.agents.vision.drawn import drawings_of, drawn_world, pictures_of
 from embodied.agents.vision.encoder import Encoder, load_encoder
 from embodied.agents.vision.live import LiveFeatures
 from embodied.assets.cache import default_cache
-from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import spread
 from embodied.gym.sensors import PanoramaStore
@@ -74,10 +72,6 @@ class TrainingData:
         pictures = {n: pictures_of(self.data, n, self.picture_kind) for n in names}
         worlds = {n: drawn_world(self.data, n, self.cache, pictures[n]) for n in names}
         return LiveFeatures(self.encoder, PanoramaStore(worlds))
-
-    def rewording(self, config: ImitationSettings) -> Callable[[str], str] | None:
-        """A function that says the texts of training in other words, if the settings want it."""
-        return varied(load_catalogue(self.cache)) if config.varied_words else None
 
     def identity(self) -> dict[str, str]:
         """Everything that an agent depends on besides its settings: the data set, the encoder, how its houses were

@@ -98,8 +98,8 @@ def train_follower(
     validation = source.split("val_unseen", limit=config.validation_tasks)
     if config.more_paths:
         training = dataclasses.replace(training, tasks=[*training.tasks, *more_tasks(source, training, config)])
-    words = build_vocabulary((t.request for t in training.tasks), reword=source.rewording(config))
-    agent = VlnAgent.new(source.about(VlnAbout, config, evaluation, words), words.reword)
+    words = build_vocabulary(t.request for t in training.tasks)
+    agent = VlnAgent.new(source.about(VlnAbout, config, evaluation, words))
     agent.network.to(source.device)
     identity = identity_of("embodied.agents.vln.run", settings=config, **source.identity())
     return imitation.train(VlnLearner(agent, training), validation, folder, identity, **options)

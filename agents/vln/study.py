@@ -10,7 +10,6 @@ from typing import Any
 from embodied.agents.common.session import Note
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.studies.wordings import words_table
 from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy
 from embodied.agents.vln.agent import VlnAgent
 from embodied.agents.vln.config import MEASURES, FollowerSettings
@@ -36,8 +35,7 @@ VLN_TABLES: Mapping[str, StudyTable] = {
         MEASURES,
         TEST_SPLITS,
         ((FOLLOWER, BLIND_FOLLOWER),),
-    ),
-    "words": words_table(_row, MEASURES, TEST_SPLITS[1:]),
+    )
 }
 
 

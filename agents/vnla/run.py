@@ -9,8 +9,7 @@ loss = - log pi_main(a*) - log pi_ask(a*), summed over steps, averaged over epis
 from __future__ import annotations
 
 import dataclasses
-import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Unpack
 
@@ -86,15 +85,12 @@ def losses_of(moments: Sequence[VnlaMoment], episodes: int) -> tuple[Tensor, Ten
     return navigation, negative_log_likelihood(asks, wished).sum() / episodes
 
 
-def vocabulary_of(data: Dataset, houses: int | None = None, reword: Callable[[str], str] | None = None) -> Vocabulary:
+def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
     """Words of the requests in the training split's first `houses` houses, and of all that the advisor can say."""
     names = data.names("train")[:houses]
     requests = [t.request for t in data.tasks("train") if t.world in names]
     answers = [PlainLanguage().subgoal([w] * n + ["stop"]) for w in WORDS for n in range(1, HELP_STEPS + 1)]
-    heard = [*requests, *answers, *(s.text for s in data.utterances(names))]
-    if reword:  # advice is said before a request
-        heard += [f"{s} . {r}" for s, r in zip(itertools.cycle(answers), requests)]
-    return build_vocabulary(heard, reword=reword)
+    return build_vocabulary([*requests, *answers, *(s.text for s in data.utterances(names))])
 
 
 def train_agent(
@@ -108,8 +104,8 @@ def train_agent(
     houses = config.training_houses or None
     training = source.split("train", houses=houses, rules=TRAINED_UNDER[config.rules])
     validation = source.split("val_unseen", limit=config.validation_tasks, rules=config.rules)
-    words = vocabulary_of(source.data, houses, source.rewording(config))
-    agent = VnlaAgent.new(source.about(VnlaAbout, config, evaluation, words), words.reword)
+    words = vocabulary_of(source.data, houses)
+    agent = VnlaAgent.new(source.about(VnlaAbout, config, evaluation, words))
     agent.network.to(source.device)
     identity = identity_of("embodied.agents.vnla.run", settings=config, **source.identity())
     return imitation.train(VnlaLearner(agent, training), validation, folder, identity, **options)

@@ -14,7 +14,6 @@ from typing import Any
 from embodied.agents.common.session import Note
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.studies.wordings import hearing, words_table
 from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy
 from embodied.agents.vnla.agent import AT_RANDOM, DIRECT, LEARNED, NEVER, TEACHER, VnlaAgent
 from embodied.agents.vnla.config import VnlaSettings
@@ -77,7 +76,6 @@ VNLA_TABLES: Mapping[str, StudyTable] = {
         _row("b to d", ask_rules="b to d"),
         _row("all"),
     ),
-    "words": words_table(_row, VNLA_MEASURES, TEST_SPLITS[1:]),
 }
 """The paper's Tables 2, 3 and 7, and the dissertation's own algorithm, which nobody has printed results of."""
 
@@ -100,8 +98,7 @@ class VnlaStudy(SightedStudy):
     def policies(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:
             return super().policies(agent, judge, split)
-        player = agent.player(self.training_data().split(split).bank, judge["played"])
-        return hearing(player, judge, agent.about.words, self.cache)
+        return agent.player(self.training_data().split(split).bank, judge["played"])
 
     def where(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
         if agent is None:

@@ -58,8 +58,6 @@ class NavConfig:
     """Additional paths per training house, each worded three times."""
     word_vectors: str = LEARNED_WORDS
     """Word embeddings: 'learned', or 'minilm', pre-trained vectors in addition."""
-    varied_words: bool = False
-    """Add paraphrases of other writers to the training requests (docs/sources.md, S184)."""
     data_seed: int = 0
     """Random seed of the further paths and of the teacher, which all students share."""
 

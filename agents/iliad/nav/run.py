@@ -6,10 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from embodied.agents.common.more_paths import more_routes
-from embodied.agents.common.paraphrases import varied
 from embodied.agents.common.session import Note
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.common.weights import save_weights
@@ -24,11 +22,10 @@ from embodied.agents.iliad.nav.stages import (
     teach_executor,
 )
 from embodied.agents.iliad.nav.student import LoopFree, NavEyes, NavStudent
-from embodied.agents.iliad.nav.teacher import GrammarNavTeacher, LearnedNavTeacher, OtherWords
+from embodied.agents.iliad.nav.teacher import GrammarNavTeacher, LearnedNavTeacher
 from embodied.agents.iliad.nav.world import NavMarginal, NavWorld, trips_of
 from embodied.agents.iliad.protocol import DescribingTeacher
 from embodied.agents.iliad.training import IliadProblem, successes
-from embodied.agents.studies.wordings import WORDING, saying
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.capture import house_features
 from embodied.agents.vision.drawn import drawings_of
@@ -107,7 +104,7 @@ class NavSetup:
             executor = teach_executor(data, config, folder, note=note)
             describer = teach_describer(data, config, executor, folder, note=note)
             teacher = LearnedNavTeacher(world, describer, executor, config.candidates)
-        return NavGrounds(config, data, teacher, self.cache)
+        return NavGrounds(config, data, teacher)
 
     def about(self) -> str:
         """Data, networks and teacher in words."""
@@ -125,17 +122,11 @@ class NavGrounds:
     config: NavConfig
     data: NavData
     teacher: DescribingTeacher
-    cache: Path
 
     def problem(self, seed: int, folder: Path, note: Note) -> IliadProblem:
         """A student of this seed with everything around it; it begins with random weights, `folder` stays empty."""
-        c, eyes, splits, teacher = self.config, self.data.eyes, self.data.splits, self.teacher
-        if c.varied_words:
-            say = varied(load_catalogue(self.cache))
-            both = [dataclasses.replace(t, requests=(*t.requests, *map(say, t.requests))) for t in splits["train"]]
-            splits, teacher = {**splits, "train": both}, OtherWords(teacher, say)
-        words = build_vocabulary(request for trip in splits["train"] for request in trip.requests).words
-        eyes = dataclasses.replace(eyes.blind() if c.blind else eyes, vocabulary=vocabulary_with(words, c.word_vectors))
+        c, eyes, splits = self.config, self.data.eyes, self.data.splits
+        eyes = eyes.blind() if c.blind else eyes
         student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
         explorer = LoopFree(new_follower(c, eyes, seed, "student"), eyes, c)
         validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION_TRIPS)]
@@ -145,16 +136,13 @@ class NavGrounds:
             path, "nav", student.network.state_dict(), about_follower(c, eyes), identity
         )
         return IliadProblem(
-            NavWorld(eyes.places), teacher, NavMarginal(eyes.places), student, explorer,
+            NavWorld(eyes.places), self.teacher, NavMarginal(eyes.places), student, explorer,
             splits["train"], validation, identity, save,
         )  # fmt: skip
 
-    def judge(self, best: Path, split: str, how: Mapping[str, Any]) -> Samples:
-        """Which requests of a split a trained student fulfils, said to it as a row has them."""
+    def judge(self, best: Path, split: str) -> Samples:
+        """Which requests of a split a trained student fulfils."""
         trips, student = self.data.splits[split], load_follower(best, self.data.eyes)
-        if WORDING in how:
-            say = saying(how[WORDING], student.eyes.vocabulary.words, self.cache)
-            trips = [dataclasses.replace(t, requests=tuple(map(say, t.requests))) for t in trips]
         good = successes(NavWorld(self.data.eyes.places), student, trips)
         return Samples(tuple(map(float, good)), tuple(t.world for t in trips), share=True)
 

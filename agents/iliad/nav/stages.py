@@ -127,15 +127,6 @@ def load_follower(path: Path, eyes: NavEyes) -> NavStudent:
     return NavStudent(follower.eval(), own.blind() if c.blind else own, c)
 
 
-def config_of(path: Path) -> NavConfig:
-    """The settings of a follower on disk.
-
-    Raises:
-      FileNotFoundError, ValueError: as load_follower.
-    """
-    return load_weights(path, "nav", NavAbout, NAV_REMEDY)[1].config
-
-
 def about_follower(config: NavConfig, eyes: NavEyes) -> NavAbout:
     """Metadata of a follower with these eyes."""
     return NavAbout(config, eyes.vocabulary.words, eyes.bank.digest)
@@ -143,7 +134,7 @@ def about_follower(config: NavConfig, eyes: NavEyes) -> NavAbout:
 
 def _settings(folder: Path, updates: int, config: NavConfig, data: NavData) -> dict[str, Any]:
     """How a network of the teacher is taught, and what it depends on."""
-    students = {"teacher", "candidates", "executor_iterations", "describer_iterations", "blind", "varied_words"}
+    students = {"teacher", "candidates", "executor_iterations", "describer_iterations", "blind"}
     settings = {k: v for k, v in vars(config).items() if k not in students}
     how = {"world": "nav", "folder": folder, "updates": updates, "rate": config.teacher_rate, "seed": config.data_seed}
     return {**how, "about": about_follower(config, data.eyes), "settings": settings, "data": data.digest}

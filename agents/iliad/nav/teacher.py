@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -16,7 +15,7 @@ from embodied.agents.iliad.describing import DescribingNetworks
 from embodied.agents.iliad.nav.network import WalkDescriber
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent, Track
 from embodied.agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
-from embodied.agents.iliad.protocol import NOTHING, DescribingTeacher
+from embodied.agents.iliad.protocol import NOTHING
 from embodied.interface import SeenPlace
 from embodied.kinds.metrics import sdtw
 
@@ -104,17 +103,3 @@ class GrammarNavTeacher:
         if len(walk.nodes) < 2:
             return None
         return self.wording(self.places[trip.world], walk.nodes, trip.start.yaw, rng=rng)
-
-
-@dataclass(frozen=True)
-class OtherWords:
-    """A teacher whose descriptions are reworded; requests that it repeats stay."""
-
-    teacher: DescribingTeacher
-    say: Callable[[str], str]
-
-    def describe(
-        self, tasks: Sequence[Trip], executions: Sequence[NavWalk], *, rng: np.random.Generator
-    ) -> list[str | None]:
-        described = zip(tasks, self.teacher.describe(tasks, executions, rng=rng), strict=True)
-        return [d if d is None or d in trip.requests else self.say(d) for trip, d in described]
