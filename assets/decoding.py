@@ -1,7 +1,6 @@
-"""Pixels of JPEG files and of 16-bit PNG files by decoders that are quicker than OpenCV's, and give the same.
+"""Pixels of picture files, those of 16-bit PNG files by a decoder that is quicker than OpenCV's, and gives the same.
 
-What they do not read, OpenCV reads: other kinds of files, photographs with an orientation, rows filtered otherwise.
-Of a PNG they check the sum of its pixels, not those of its chunks.
+What it does not read, OpenCV reads: rows filtered otherwise. It checks the sum of the pixels, not those of chunks.
 """
 
 from __future__ import annotations
@@ -12,10 +11,8 @@ import struct
 import cv2
 import deflate
 import numpy as np
-import simplejpeg
 from PIL import Image
 
-JFIF, EXIF = b"\xff\xd8\xff\xe0", b"Exif\0"
 PNG = b"\x89PNG\r\n\x1a\n"
 HEADER = b"IHDR"
 GREY_16 = struct.pack(">5B", 16, 0, 0, 0, 0)
@@ -40,11 +37,6 @@ def colours(data: bytes, order: str = "RGB") -> np.ndarray | None:
     Args:
       order: of the channels, 'RGB', 'BGR' or 'BGRA'.
     """
-    if data.startswith(JFIF) and EXIF not in data:
-        try:
-            return simplejpeg.decode_jpeg(data, order)
-        except ValueError:  # OpenCV reads more of them
-            pass
     pixels = _by_opencv(data, cv2.IMREAD_COLOR_RGB if order == "RGB" else cv2.IMREAD_COLOR)
     return cv2.cvtColor(pixels, cv2.COLOR_BGR2BGRA) if order == "BGRA" and pixels is not None else pixels
 

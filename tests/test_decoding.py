@@ -67,13 +67,11 @@ def test_numbers_are_those_of_opencv(kind, filtered):
     assert (got == image).all()
 
 
-def test_the_files_that_are_written_here_are_read_without_opencv(monkeypatch):
+def test_depths_that_are_written_here_are_read_without_opencv(monkeypatch):
     image = np.full((16, 24), 40_000, np.uint16)
     depth = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP])[1].tobytes()
-    jpeg = cv2.imencode(".jpg", picture())[1].tobytes()
     monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("OpenCV decodes it"))
     assert (numbers(depth) == image).all()
-    assert colours(jpeg).shape == (37, 61, 3)
 
 
 @pytest.mark.parametrize("broken", [b"", b"\xff\xd8\xff\xe0", COLOURS["grey"][:-200], b"\x89PNG\r\n\x1a\n" + bytes(30)])

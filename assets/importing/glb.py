@@ -1,8 +1,8 @@
 """Binary glTF 2.0 files as RawParts: triangles, colours and pictures as the format means them.
 
 Why not trimesh's loader, nor Assimp's: the one drops what it does not know without a word (second texture coordinates,
-texture transforms, sparse accessors, skins, fans), the other reads files beside the model, in C++, unchecked; and
-what a file requires must be read here all the same, to refuse it by name.
+texture transforms, skins), the other reads files beside the model, in C++, unchecked; and what a file requires must be
+read here all the same, to refuse it by name.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ REFUSED = {
 LOOK_EXTENSIONS = "KHR_materials_"
 """Beginning of extensions that refine a look; without them the material is drawn as the core of the format says."""
 COMPONENT_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 MAX_NODES = 20_000
 CLAMPED, MIRRORED = 33071, 33648
 """CLAMP_TO_EDGE and MIRRORED_REPEAT."""
@@ -198,20 +198,21 @@ class _Reader:
         return memoryview(data)[first : first + size]
 
     def _accessor(self, number: int, width: int) -> np.ndarray:
-        """(n, width) float64, normalised where it says so, sparse values put in."""
+        """(n, width) float64, normalised where it says so."""
         accessor = self.header["accessors"][number]
         kind, held = np.dtype(COMPONENT_TYPES[accessor["componentType"]]), WIDTHS[accessor["type"]]
         if number < 0 or held != width:
             raise ValueError(f"accessor {number} should hold {width} numbers each")
-        count, sparse = self._count(accessor), accessor.get("sparse")
+        if "sparse" in accessor:
+            raise RefusedError("its numbers are sparse accessors; open it in Blender and export it again")
+        count = self._count(accessor)
         if "bufferView" in accessor:
-            out = self._numbers(accessor, kind, count, held).copy()
+            view = self.header["bufferViews"][accessor["bufferView"]]
+            steps = view.get("byteStride") or kind.itemsize * width, kind.itemsize
+            data, first = self._view(accessor["bufferView"]), accessor.get("byteOffset", 0)
+            out = np.ndarray((count, width), kind, data, first, steps).astype(np.float64)
         else:
-            out = np.zeros((count, held), kind)  # as section 3.6.2.3 asks
-        if sparse:
-            where = self._numbers(sparse["indices"], None, sparse["count"], 1)[:, 0]
-            out[where] = self._numbers(sparse["values"], kind, sparse["count"], held)
-        out = out.astype(np.float64)
+            out = np.zeros((count, width))  # as section 3.6.2.3 asks
         return np.maximum(out / np.iinfo(kind).max, -1.0) if accessor.get("normalized") and kind.kind in "iu" else out
 
     def _count(self, accessor: dict[str, Any]) -> int:
@@ -219,13 +220,6 @@ class _Reader:
         if not isinstance(count, int) or not 0 <= count <= 3 * MAX_FACES:
             raise ValueError(f"an accessor should count 0 to {3 * MAX_FACES} elements, got {shown(count)}")
         return count
-
-    def _numbers(self, where: dict[str, Any], kind: np.dtype | None, count: int, width: int) -> np.ndarray:
-        kind = kind or np.dtype(COMPONENT_TYPES[where["componentType"]])
-        view = self.header["bufferViews"][where["bufferView"]]
-        step = view.get("byteStride") or kind.itemsize * width
-        data = self._view(where["bufferView"])
-        return np.ndarray((count, width), kind, data, where.get("byteOffset", 0), (step, kind.itemsize))
 
     def parts(self) -> tuple[RawPart, ...]:
         """All triangles of the scene, gathered by what they look like."""
@@ -246,7 +240,6 @@ class _Reader:
     def _nodes(self) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
         """The nodes of the scene that have a mesh, with their (4, 4) matrices."""
         nodes = self.header.get("nodes", [])
-        self.matrices: dict[int, np.ndarray] = {}
         children = {c for n in nodes for c in n.get("children", ())}
         roots, scenes = sorted({*range(len(nodes))} - children), self.header.get("scenes")
         if scenes:
@@ -261,7 +254,7 @@ class _Reader:
             if seen > MAX_NODES:
                 raise ValueError(f"it has more than {MAX_NODES} nodes, or one below itself")
             node = nodes[number]
-            matrix = self.matrices[number] = above @ _matrix(node)
+            matrix = above @ _matrix(node)
             if "mesh" in node:
                 meshes.append((node, matrix))
             ways += [(child, matrix) for child in reversed(node.get("children", ()))]
@@ -276,13 +269,13 @@ class _Reader:
         if not len(faces):
             self._leave_out(f"{name} is left out: it has no triangles")
             return
-        vertices = self._vertices(node, primitive)
+        vertices = self._accessor(attributes["POSITION"], 3)
+        weights = node.get("weights") or self.header["meshes"][node["mesh"]].get("weights") or ()
+        if "skin" in node or (any(weights) and "targets" in primitive):
+            raise RefusedError(f"{name} is posed by a skeleton or shape keys; apply them and export the model again")
         if faces.min() < 0 or faces.max() >= len(vertices):
             raise ValueError(f"a face of node {number} names a vertex that is not there")
         with np.errstate(over="ignore", invalid="ignore"):
-            if "skin" in node and "JOINTS_0" in attributes:
-                vertices = self._skinned(node, attributes, vertices)
-                matrix = np.eye(4)
             vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
             if np.linalg.det(matrix[:3, :3]) < 0:
                 faces = faces[:, ::-1]
@@ -313,47 +306,12 @@ class _Reader:
         corners = np.arange(self._count(positions))
         if "indices" in primitive:
             corners = self._accessor(primitive["indices"], 1)[:, 0].astype(np.int64)
-        if mode == 4:
-            return corners[: len(corners) // 3 * 3].reshape(-1, 3)
-        steps = np.arange(max(0, len(corners) - 2))
-        if mode == 5:  # every second one of a strip is wound the other way
-            order = np.stack([steps, steps + 1 + steps % 2, steps + 2 - steps % 2], axis=1)
-        elif mode == 6:
-            order = np.stack([steps * 0, steps + 1, steps + 2], axis=1)
-        else:
+        if mode in (5, 6):
+            raise RefusedError("its triangles are strips or fans; open it in Blender and export it again")
+        if mode != 4:
             self._leave_out("its points and lines are left out: they have no surface")
-            return np.empty((0, 3), np.int64)
-        faces = corners[order]
-        return faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
-
-    def _vertices(self, node: dict[str, Any], primitive: dict[str, Any]) -> np.ndarray:
-        """(n, 3) positions, moved by what morph targets weigh at rest."""
-        out = self._accessor(primitive["attributes"]["POSITION"], 3)
-        weights = node.get("weights") or self.header["meshes"][node["mesh"]].get("weights") or ()
-        for weight, target in zip(weights, primitive.get("targets", ())):
-            if weight and "POSITION" in target:
-                out = out + weight * self._accessor(target["POSITION"], 3)
-        return out
-
-    def _skinned(self, node: dict[str, Any], attributes: dict[str, int], vertices: np.ndarray) -> np.ndarray:
-        """(n, 3) vertices in the pose that the skeleton is saved in (section 3.7.3.3); world."""
-        skin = self.header["skins"][node["skin"]]
-        self.tell("its skeleton does not move: it stands in the pose that it is saved in")
-        joints = np.stack([self.matrices.get(j, np.eye(4)) for j in skin["joints"]])
-        if "inverseBindMatrices" in skin:
-            inverse = self._accessor(skin["inverseBindMatrices"], 16).reshape(-1, 4, 4).transpose(0, 2, 1)
-            joints = joints @ inverse[: len(joints)]
-        out, total = np.zeros((len(vertices), 3)), np.zeros((len(vertices), 1))
-        whole = np.concatenate([vertices, np.ones((len(vertices), 1))], axis=1)
-        for k in range(8):
-            if f"JOINTS_{k}" not in attributes:
-                break
-            which = self._accessor(attributes[f"JOINTS_{k}"], 4).astype(int)
-            weights = self._accessor(attributes[f"WEIGHTS_{k}"], 4)
-            for i in range(4):
-                moved = np.einsum("nij,nj->ni", joints[which[:, i]], whole)[:, :3]
-                out, total = out + weights[:, i : i + 1] * moved, total + weights[:, i : i + 1]
-        return out / np.maximum(total, 1e-9)
+            corners = corners[:0]
+        return corners[: len(corners) // 3 * 3].reshape(-1, 3)
 
     def _surface(self, number: int | None, coloured: bool) -> _Surface:
         if number is None:  # nobody said what it is: neither the format's bare metal, nor brighter than paper

@@ -373,66 +373,37 @@ def _triangles(p: np.ndarray) -> list[tuple[int, int, int]]:
 def _ears(p: np.ndarray) -> list[tuple[int, int, int]]:
     """Ear clipping of a simple counter-clockwise polygon (n, 2): always the first ear, or where there is
     none the least bad corner. A corner that is no ear is looked at again only when that can have changed it."""
-    ring = _Ring(p)
-    out = []
-    while ring.count > 3:
-        corner = ring.first_ear()
-        out.append((int(ring.before[corner]), corner, int(ring.after[corner])))
-        ring.cut(corner)
-    a, b, c = np.flatnonzero(ring.left).tolist()
+    n, out = len(p), []
+    before, after = np.roll(np.arange(n), 1), np.roll(np.arange(n), -1)
+    left, hopeful = np.ones(n, bool), np.ones(n, bool)  # those that are ears, or to be looked at
+    score, blocker = np.full(n, -np.inf), np.full(n, -1)
+    for _ in range(n - 3):
+        while hopeful[k := int(np.argmax(hopeful))] and score[k] < np.inf:
+            score[k], blocker[k] = _looked_at(p, left, [before[k], k, after[k]])
+            hopeful[k] = score[k] == np.inf
+        k = k if hopeful[k] else int(np.argmax(score))
+        a, b = before[k], after[k]
+        out.append((int(a), k, int(b)))
+        after[a], before[b] = b, a
+        hopeful |= blocker == k
+        hopeful[[a, b]] = True
+        left[k] = hopeful[k] = False
+        score[[a, b, k]], blocker[k] = -np.inf, -1
+    a, b, c = np.flatnonzero(left).tolist()
     return [*out, (a, b, c)]
 
 
-class _Ring:
-    """The corners that are left of a polygon while its ears are cut, and what is known about each."""
-
-    def __init__(self, p: np.ndarray) -> None:
-        self.p, self.x, self.y = p, np.ascontiguousarray(p[:, 0]), np.ascontiguousarray(p[:, 1])
-        self.count = len(p)
-        self.left = np.ones(len(p), dtype=bool)
-        self.before, self.after = np.roll(np.arange(len(p)), 1), np.roll(np.arange(len(p)), -1)
-        self.hopeful = np.ones(len(p), dtype=bool)
-        """Corners that are ears or have not been looked at since something changed."""
-        self.ear = np.zeros(len(p), dtype=bool)
-        self.score = np.full(len(p), -np.inf)
-        self.blocker = np.full(len(p), -1)
-        """The corner inside the triangle of one that is no ear."""
-
-    def first_ear(self) -> int:
-        """The first corner whose triangle holds no other corner, or the best one where there is no such."""
-        while self.hopeful[corner := int(np.argmax(self.hopeful))]:
-            if not self.ear[corner]:
-                self._look(corner)
-            if self.ear[corner]:
-                return corner
-        return int(np.argmax(self.score))
-
-    def cut(self, corner: int) -> None:
-        """Take a corner out; its neighbours, and those it kept from being ears, may be ears now."""
-        a, b = self.before[corner], self.after[corner]
-        self.after[a], self.before[b] = b, a
-        self.count -= 1
-        self.ear[[a, b]] = False
-        self.hopeful[[a, b]] = True
-        self.hopeful |= self.blocker == corner
-        self.left[corner] = self.hopeful[corner] = False
-        self.score[corner], self.blocker[corner] = -np.inf, -1
-
-    def _look(self, corner: int) -> None:
-        (ax, ay), (bx, by), (cx, cy) = self.p[[self.before[corner], corner, self.after[corner]]].tolist()
-        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        self.hopeful[corner], self.blocker[corner] = False, -1
-        if area <= 0:
-            self.score[corner] = area - 1e6
-            return
-        x, y = self.x, self.y
-        inside = self.left & ((bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0)
-        inside &= (cx - bx) * (y - by) - (cy - by) * (x - bx) >= 0
-        within = np.flatnonzero(inside & ((ax - cx) * (y - cy) - (ay - cy) * (x - cx) >= 0))
-        # Its own corners apart, which keyhole polygons visit twice.
-        corners = ((ax, ay), (bx, by), (cx, cy))
-        blocker = next((q for q in within[::-1].tolist() if (x[q], y[q]) not in corners), -1)
-        if blocker >= 0:
-            self.score[corner], self.blocker[corner] = -1e9, blocker
-        else:
-            self.ear[corner] = self.hopeful[corner] = True
+def _looked_at(p: np.ndarray, left: np.ndarray, triple: list[int]) -> tuple[float, int]:
+    """How good it is to cut the triangle of three corners off, infinite for an ear; and a corner inside, or -1."""
+    corners = p[triple].tolist()
+    (ax, ay), (bx, by), (cx, cy) = corners
+    area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    if area <= 0:
+        return area - 1e6, -1
+    x, y = p.T
+    inside = left & ((bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0)
+    inside &= (cx - bx) * (y - by) - (cy - by) * (x - bx) >= 0
+    within = np.flatnonzero(inside & ((ax - cx) * (y - cy) - (ay - cy) * (x - cx) >= 0))
+    # Its own corners apart, which keyhole polygons visit twice.
+    held = next((q for q in within[::-1].tolist() if p[q].tolist() not in corners), -1)
+    return (np.inf, -1) if held < 0 else (-1e9, held)

@@ -17,15 +17,7 @@ import numpy as np
 from embodied.assets.archives import MOST_PIXELS
 from embodied.assets.decoding import colours, numbers, size_of
 from embodied.geometry import yaw_of_heading
-from embodied.render.panorama import (
-    PixelGrid,
-    checked,
-    padded_plane,
-    padded_rgba,
-    perspective_grid,
-    read_maps,
-    resampled_rgb,
-)
+from embodied.render.panorama import PixelGrid, checked, padded_plane, padded_rgba, perspective_grid, resampled_rgb
 
 TILES = ((3, 0), (5, 1), (2, 3), (4, 1), (0, 1), (1, 2))
 """Face and quarter turns (counter-clockwise) of each tile."""
@@ -115,7 +107,7 @@ class Skyboxes:
         (its src/lib/fragment.sh).
         """
         padded = self.distances(scan, viewpoint)
-        _, x, y = read_maps(padded, _grid(padded.shape[1] - 2, heading, elevation, vfov, size))
+        _, x, y = _grid(padded.shape[1] - 2, heading, elevation, vfov, size).maps()
         along_rays = cv2.remap(padded, x, y, cv2.INTER_LINEAR)
         return cv2.multiply(along_rays, _ray_shortening(vfov, *size), dtype=cv2.CV_16U)[..., None]
 

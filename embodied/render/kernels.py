@@ -47,21 +47,3 @@ def locate(
             along[i, j] = depth
             x[i, j] = middle + right * scale
             y[i, j] = middle + down * scale + face * side
-
-
-@compiled_for(f"int64[:, ::1]({MAP}, {MAP}, int64, int64)")
-def shown(x: np.ndarray, y: np.ndarray, side: int, step: int) -> np.ndarray:
-    """(6, 4): first and last row and column of what `sampling.shown` finds of each face; -1 where it shows none."""
-    extents = np.full((6, 4), -1)
-    for i in range(0, x.shape[0], step):
-        for j in range(0, x.shape[1], step):
-            row, column = int(y[i, j]), int(x[i, j])
-            face = row // side
-            if extents[face, 1] < 0:
-                extents[face] = row
-                extents[face, 2:] = column
-            extents[face, 0] = min(extents[face, 0], row)
-            extents[face, 1] = max(extents[face, 1], row)
-            extents[face, 2] = min(extents[face, 2], column)
-            extents[face, 3] = max(extents[face, 3], column)
-    return extents

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
-from embodied.render.sampling import AXES, Rays, locate, shown
+from embodied.render.sampling import AXES, Rays, locate
 
 VFOV36 = math.radians(60.0)
 """Vertical field of view of the 36 views of the VLN literature (Anderson et al. 2018, sec. 3.2)."""
@@ -137,7 +137,7 @@ class Panorama:
         return resampled_depth(self._padded_nearness, grid)
 
     def _ids(self, grid: PixelGrid) -> np.ndarray:
-        _, x, y = read_maps(self._padded_ids, grid)
+        _, x, y = grid.maps()
         return cv2.remap(self._padded_ids, x, y, cv2.INTER_NEAREST).view(np.int32)
 
 
@@ -179,14 +179,14 @@ def padded_plane(
 
 def resampled_rgb(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     """(h, w, 3) uint8: what a grid shows of `padded_rgba`."""
-    rgba, (_, x, y) = _scratch(grid.shape, threading.get_ident()).rgba, read_maps(padded, grid)
+    rgba, (_, x, y) = _scratch(grid.shape, threading.get_ident()).rgba, grid.maps()
     cv2.remap(padded, x, y, cv2.INTER_LINEAR, dst=rgba)
     return cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
 
 
 def resampled_depth(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     """(h, w) float32: the depth that a grid shows of `padded_nearness`; inf where nothing is."""
-    work, (along, x, y) = _scratch(grid.shape, threading.get_ident()), read_maps(padded, grid)
+    work, (along, x, y) = _scratch(grid.shape, threading.get_ident()), grid.maps()
     nearest = cv2.remap(padded, x, y, cv2.INTER_NEAREST)
     cv2.remap(padded, x, y, cv2.INTER_LINEAR, dst=work.smooth)
     cv2.divide(work.smooth, nearest, dst=work.ratio)
@@ -195,14 +195,6 @@ def resampled_depth(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     cv2.multiply(nearest, along, dst=nearest)
     with np.errstate(divide="ignore"):
         return np.divide(1.0, nearest, out=nearest)
-
-
-def read_maps(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
-    """The maps of a grid, once what they show has been read: in order it comes into the cache sooner than by pixels."""
-    maps, words = grid.maps(), padded if padded.ndim == 2 else padded.view(np.int32)[..., 0]
-    for rows, columns in grid.shown:
-        cv2.countNonZero(words[rows, columns])
-    return maps
 
 
 @dataclass(eq=False)
@@ -267,12 +259,6 @@ class PixelGrid:
         self.draw(work.maps)
         work.grid = self
         return work.maps
-
-    @functools.cached_property
-    def shown(self) -> list[tuple[slice, slice]]:
-        """About which rows and columns of the padded faces the picture shows."""
-        _, x, y = self.maps()
-        return shown(self.s, x, y)
 
 
 @dataclass(frozen=True, eq=False)

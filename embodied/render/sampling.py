@@ -34,8 +34,6 @@ PICTURE_AXES = (AXES * [[1], [1], [-1]]).astype(np.float32)
 """(6, 3, 3): forward, right and down of every face as a picture shows it."""
 BY_AXIS = (0, 2, 1, 3, 4, 5)
 """Of faces that a ray meets at their edge, the first here has it."""
-NEXT = 16
-"""From one pixel to the next of those that tell about which part of the faces a picture shows."""
 
 
 class Rays(NamedTuple):
@@ -81,20 +79,9 @@ def locate(s: int, rays: Rays, maps: np.ndarray) -> None:
             cv2.copyTo(values, nearer, to)
 
 
-def shown(s: int, x: np.ndarray, y: np.ndarray) -> list[tuple[slice, slice]]:
-    """About which rows and columns of the faces a picture shows, of which two maps of `locate` are given."""
-    if (kernels := numba_kernels()) is not None:
-        extents = kernels.shown(x, y, s + 2, NEXT).tolist()
-    else:
-        across, down = x[::NEXT, ::NEXT].astype(int), y[::NEXT, ::NEXT].astype(int)
-        of = [(down[on], across[on]) for on in (down // (s + 2) == face for face in range(6)) if on.any()]
-        extents = [(rows.min(), rows.max(), columns.min(), columns.max()) for rows, columns in of]
-    return [(slice(top, bottom + NEXT), slice(left, right + NEXT)) for top, bottom, left, right in extents if top >= 0]
-
-
 @functools.cache
 def numba_kernels() -> ModuleType | None:
-    """embodied.render.kernels, which has `locate` and `shown` in compiled code, if Numba is installed and works."""
+    """embodied.render.kernels, which has `locate` in compiled code, if Numba is installed and works."""
     try:
         return importlib.import_module("embodied.render.kernels")
     except ImportError:
