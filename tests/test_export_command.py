@@ -18,7 +18,7 @@ from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import feature_path, save_features
 from embodied.cli import export, exports
 from embodied.cli.common import Printed
-from embodied.cli.exports import Export, register_export, registered_exports
+from embodied.cli.exports import register_export, registered_exports
 from embodied.datasets.folders import names_of
 from embodied.gym import drive
 from embodied.options import OutputFolder
@@ -99,8 +99,8 @@ def test_an_export_is_known_by_its_registered_record_alone(tmp_path, monkeypatch
         out: OutputFolder
         """Folder to greet."""
 
-    register_export(Export("greeting", Options, lambda args: print("hello", args.out)))
-    monkeypatch.setattr(export, "COMMANDS", {name: (e.options, e.run) for name, e in registered_exports().items()})
+    register_export("greeting", Options, lambda args: print("hello", args.out))
+    monkeypatch.setattr(export, "COMMANDS", registered_exports())
     try:
         assert cli.main(["export", "greeting", "--out", str(tmp_path)]) == 0
         assert capsys.readouterr().out == f"hello {tmp_path}\n"

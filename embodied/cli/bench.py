@@ -38,7 +38,7 @@ class BenchOptions(Furnished, Printed):
 
 def run(args: BenchOptions) -> None:
     from embodied import gl
-    from embodied.bench import bakes, drive, episodes, light, seen, timing, views, world
+    from embodied.bench import light, seen, timing, world
 
     parts = args.part or ["houses", "pictures", "plays"]
     if unknown := sorted(set(parts) - set(PARTS)):
@@ -47,11 +47,11 @@ def run(args: BenchOptions) -> None:
     lines = {
         "houses": lambda: world.houses(catalogue, args.seed),
         "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.pictures),
-        "views": lambda: views.views(catalogue, args.cache, args.seed),
-        "plays": lambda: episodes.plays(catalogue, args.seed),
+        "views": lambda: seen.views(catalogue, args.cache, args.seed),
+        "plays": lambda: world.plays(catalogue, args.seed),
         "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.pictures),
-        "drive": lambda: drive.drive(catalogue, args.cache, args.seed, args.pictures),
-        "bakes": lambda: bakes.bakes(catalogue, args.cache, args.seed),
+        "drive": lambda: seen.drive(catalogue, args.cache, args.seed, args.pictures),
+        "bakes": lambda: world.bakes(catalogue, args.cache, args.seed),
     }
     measures = []
     for m in itertools.chain.from_iterable(lines[p]() for p in parts if p in lines):

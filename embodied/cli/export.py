@@ -4,4 +4,4 @@ from __future__ import annotations
 
 from embodied.cli.exports import registered_exports
 
-COMMANDS = {name: (export.options, export.run) for name, export in registered_exports().items()}
+COMMANDS = registered_exports()

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from embodied.cli.common import note
-from embodied.cli.learners import learner_commands
+from embodied.cli.train import learner_commands
 
 
 def commands(words: Sequence[str]) -> Mapping[str, Any]:

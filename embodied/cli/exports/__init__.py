@@ -1,12 +1,11 @@
-"""Formats that `embodied export` writes; each file of this folder registers one, or some that share their options."""
+"""Formats that `embodied export` writes; each file of this folder registers some."""
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 from embodied.cli.common import Printed
@@ -21,29 +20,22 @@ class OfData(Printed):
     """Folder to write, made if missing."""
 
 
-@dataclass(frozen=True)
-class Export:
-    """A format that is written for other programs."""
-
-    name: str
-    """As in `embodied export NAME`."""
-    options: type
-    """A record of options (embodied.options), whose docstring is the help."""
-    run: Callable[[Any], None]
-    """Writes what the options say, and shows it."""
+_REGISTERED: dict[str, tuple[type, Callable[[Any], None]]] = {}
 
 
-_REGISTERED: dict[str, Export] = {}
+def register_export(name: str, options: type, run: Callable[[Any], None]) -> None:
+    """Make a format known as `embodied export NAME`; the name must be new.
+
+    Args:
+      options: a record of options (embodied.options), whose docstring is the help.
+      run: writes what the options say, and shows it.
+    """
+    assert name not in _REGISTERED, f"there are two exports {name!r}"
+    _REGISTERED[name] = options, run
 
 
-def register_export(export: Export) -> None:
-    """Make a format known; its name must be new."""
-    assert export.name not in _REGISTERED, f"there are two exports {export.name!r}"
-    _REGISTERED[export.name] = export
-
-
-def registered_exports() -> Mapping[str, Export]:
-    """All formats by name, in the order of their files."""
+def registered_exports() -> dict[str, tuple[type, Callable[[Any], None]]]:
+    """Options and writer of all formats by name, in the order of their files."""
     for module in pkgutil.iter_modules(__path__):
         importlib.import_module(f"{__name__}.{module.name}")
-    return MappingProxyType(_REGISTERED)
+    return dict(_REGISTERED)
