@@ -46,8 +46,7 @@ if TYPE_CHECKING:
     from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
     from embodied.datasets.store import Dataset
     from embodied.evaluation.evaluate import agent as baseline
-    from embodied.evaluation.evaluate import evaluate
-    from embodied.evaluation.rollout import play
+    from embodied.evaluation.evaluate import evaluate, play
     from embodied.evaluation.tables import markdown
     from embodied.generate import HouseConfig, generate_house
     from embodied.generate.plan_file import house_of_plan, load_plan
@@ -71,8 +70,7 @@ _HOMES = {
     "embodied.assets.catalogue": ("Catalogue", "load_catalogue"),
     "embodied.datasets.build": ("DatasetConfig", "build_dataset", "draw_panoramas"),
     "embodied.datasets.store": ("Dataset",),
-    "embodied.evaluation.evaluate": ("evaluate",),
-    "embodied.evaluation.rollout": ("play",),
+    "embodied.evaluation.evaluate": ("evaluate", "play"),
     "embodied.evaluation.tables": ("markdown",),
     "embodied.generate": ("HouseConfig", "generate_house"),
     "embodied.generate.plan_file": ("house_of_plan", "load_plan"),
@@ -146,7 +144,7 @@ def __getattr__(name: str) -> object:
     if name == "__version__":
         from importlib.metadata import version
 
-        from embodied.distribution import DISTRIBUTION
+        from embodied.software import DISTRIBUTION
 
         value: object = version(DISTRIBUTION)
     elif name in _FOUND:

@@ -19,7 +19,7 @@ from typing import Any
 
 from embodied import software
 from embodied.errors import UnableError
-from embodied.threads import keep_drawing_to_threads
+from embodied.software import keep_drawing_to_threads
 
 BACKENDS = ("egl", "osmesa")
 ELSEWHERE = (

@@ -1,4 +1,5 @@
-"""Libraries that `embodied doctor --fix` brings to machines where nobody may install packages of the system.
+"""Our distribution's name, the processors and threads that we use, and libraries that `embodied doctor --fix` brings
+to machines where nobody may install packages of the system.
 
 The wheel lavavu-osmesa (Linux, x86-64) carries software OpenGL (OSMesa) and LLVM; nothing of LavaVu itself is used.
 libatomic, which Dr.Jit's wheel expects of the system, is unpacked from Debian's package into the environment; so are
@@ -13,6 +14,7 @@ import ctypes.util
 import functools
 import importlib
 import importlib.util
+import os
 import shutil
 import subprocess
 import sys
@@ -112,3 +114,34 @@ def unpack(package: str, pattern: str, folder: Path) -> bool:
                 shutil.copyfile(path, draft)
         return bool(files)
     return False
+
+
+def processors() -> int:
+    """Processors that this process may run on; all there are on systems that do not tell, such as macOS."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def threads_allowed() -> int | None:
+    """Threads that this process should use, as OMP_NUM_THREADS has it but no more than there are processors; None where
+    nobody says.
+
+    The workers of joblib and of Ray get it as their share of the machine. Without it every process takes all
+    processors, and threads that wait for work do so awake (docs/scaling.md).
+    """
+    first = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()  # a list is for nested loops
+    return min(int(first), processors()) if first.isdecimal() and int(first) > 0 else None
+
+
+def keep_drawing_to_threads() -> None:
+    """Have Mesa's software OpenGL, which is not open yet, and OpenCV draw with as many threads as are allowed."""
+    threads = threads_allowed()
+    if threads is None:
+        return
+    import cv2
+
+    os.environ.setdefault("LP_NUM_THREADS", str(threads if threads > 1 else 0))  # 0: in the thread that draws
+    cv2.setNumThreads(threads)
+
+
+DISTRIBUTION = "embodied-houses"
+"""The distribution's name for pip; `embodied` on PyPI is another project's."""

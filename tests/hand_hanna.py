@@ -6,10 +6,9 @@ from hand_worlds import grid_world, line_world
 
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes
-from embodied.envs.hanna import HannaEnv
 from embodied.interface import FindObject, Pose, Route, Task
+from embodied.kinds.shipped.hanna import HannaEnv, hanna_pool, hanna_task
 from embodied.language.plain_language import PlainLanguage
-from embodied.tasks.hanna import hanna_pool, hanna_task
 
 LINE_TASK = Task(
     "line/hanna/0", "hanna", "line", Pose(0), FindObject("mug", None, ("mug_1",)), (3,), "find a mug", 0.0, 20

@@ -25,15 +25,15 @@ from embodied.cli import main as start
 from embodied.envs.ask import AskSettings, Prices
 from embodied.evaluation import tables
 from embodied.evaluation.asking import ask_counts, late_env
+from embodied.evaluation.evaluate import play
 from embodied.evaluation.own_agents import read_seeds, submitted
-from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.sensors import SensorSuite
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.interface import Ask, Intention, Move, Pose, Stop
 from embodied.kinds.metrics import success
 from embodied.kinds.shipped.ask import ASK, ask_environments, price, success_progress, weighted_success
-from embodied.language.questions import intention_of
+from embodied.language.templates import intention_of
 from embodied.policies.ask import ASKER_RULES, COLLECT, Asker, CollectThenSplit, EpisodeMemory
 from embodied.records import from_json, to_json
 from embodied.tasks.ask import AMBIGUOUS, ask_pool, ask_tasks

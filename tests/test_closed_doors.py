@@ -10,7 +10,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
 from embodied.envs.base import ActionError, DoorRule, HelpEnv
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.gym.spaces import SpaceLayout, action_mask, decode, number
 from embodied.house.moment import Moment
 from embodied.interface import Close, Episode, FindObject, FollowRoute, Move, Open, Pose, Stop, Task, viewpoint

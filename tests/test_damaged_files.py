@@ -53,7 +53,7 @@ from embodied.assets.rows import DATA
 from embodied.datasets import habitat
 from embodied.datasets.store import Dataset
 from embodied.errors import UnableError
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.generate.furnish.tables import tables as furniture_tables
 from embodied.generate.plan_file import load_plan
 from embodied.house.house import House

@@ -15,7 +15,7 @@ from embodied.datasets import build as building
 from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, shares, units
 from embodied.datasets.scale import quota, scale
 from embodied.datasets.store import Dataset, DatasetError
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.house.house import HouseError
 from embodied.interface import Ask
 from embodied.kinds import metrics

@@ -13,8 +13,7 @@ from hand_worlds import grid_world, thing
 from test_language_models import client_of
 
 from embodied.agents.language_models.agent import LanguageModelAgent
-from embodied.evaluation.evaluate import agent
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import agent, play
 from embodied.interface import Move, Sighting, Stop
 from embodied.kinds.metrics import success
 from embodied.kinds.shipped.eqa import EQA, FEWEST_HOPS, facts, grounded

@@ -25,7 +25,7 @@ from embodied.assets.closure import ROOT
 from embodied.cli import doctor
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.store import Dataset
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import Episode
 from embodied.light import LightError, backend
 from embodied.light.baking import house as baking

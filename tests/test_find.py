@@ -18,7 +18,7 @@ from embodied.agents.find.run import Finder, FinderAbout, FindLearner, Labels, n
 from embodied.agents.find.way_map import WayMap
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.training_data import Split
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import Move, Sight
 from embodied.kinds import metrics
 from embodied.kinds.shipped.find import FIND

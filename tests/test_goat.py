@@ -12,8 +12,7 @@ from hand_worlds import HandWorld, line_world
 
 from embodied.cli.exports import registered_exports
 from embodied.datasets.habitat import from_habitat, write_goat
-from embodied.evaluation.evaluate import agent
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import agent, play
 from embodied.interface import FindInTurn, Move, NextGoal, Pose, Stop, Task, viewpoint
 from embodied.kinds.shipped.goat import GOAL_STEPS, GOAT, UNSEEN_CLASSES, GoatEnv, outcomes
 from embodied.kinds.task_kind import EnvInputs, TaskInputs

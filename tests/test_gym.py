@@ -15,7 +15,7 @@ from hand_data import DATA_KINDS
 from hand_worlds import grid_world
 
 import embodied.gym.env
-from embodied.assistants.description_arrays import word_number, words
+from embodied.assistants.descriptions import word_number, words
 from embodied.envs.base import ActionError
 from embodied.envs.hari import Costs, HariRules
 from embodied.gym.spaces import SpaceLayout, number
@@ -162,7 +162,7 @@ def test_too_many_candidates_are_an_error_that_names_the_remedy(tmp):
 @pytest.mark.slow
 def test_words_of_descriptions_have_the_numbers_of_the_catalogue_in_every_process():
     code = (
-        "from embodied.assistants.description_arrays import word_number, words\n"
+        "from embodied.assistants.descriptions import word_number, words\n"
         "print([word_number(w) for w in ('mug', 'kitchen', 'go', 'rug', 'my own thing')], len(words()))"
     )
     seed = "1" if os.environ.get("PYTHONHASHSEED") != "1" else "2"

@@ -15,12 +15,11 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna, AssistantError
 from embodied.assistants.route_system import build_routes, sampled_paths
 from embodied.envs.base import ActionError
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import VIEWS, Ask, Intention, Mode, Move, Pose, Route, Step, Stop, Thought, Viewpoint, viewpoint
 from embodied.kinds import metrics
 from embodied.kinds.shipped.hanna import subtask_success
-from embodied.language.detokenize import detokenized
-from embodied.language.plain_language import PlainLanguage
+from embodied.language.plain_language import PlainLanguage, detokenized
 from embodied.navigation.graph import count_hops
 from embodied.policies.baselines import (
     PerfectInterpreter,

@@ -48,13 +48,12 @@ from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.training_data import Split
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes
-from embodied.envs.hanna import HannaEnv
-from embodied.evaluation.rollout import play
-from embodied.identity import identity_of
+from embodied.evaluation.evaluate import play
 from embodied.interface import Ask, Move, Observation, Sight, Stop, Task
+from embodied.kinds.shipped.hanna import HannaEnv, hanna_pool, hanna_task
 from embodied.language.plain_language import PlainLanguage
 from embodied.locks import LockedError, locked
-from embodied.tasks.hanna import hanna_pool, hanna_task
+from embodied.records import identity_of
 from embodied.teachers.hanna import HannaTeacher
 
 torch.set_num_threads(1)

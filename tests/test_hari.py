@@ -12,13 +12,13 @@ from embodied.assistants.descriptions import Describer, dropped, frequent_classe
 from embodied.assistants.hari import HariAssistant, Uncooperative, subgoal
 from embodied.envs.base import ActionError
 from embodied.envs.hari import HariEnv, HariExtras, shaped_costs
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import Ask, Feature, FindObject, Intention, Mode, Move, Pose, Stop, Task
 from embodied.kinds import metrics
+from embodied.kinds.shipped.hari import hari_pool, hari_task
 from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import count_hops
 from embodied.policies.baselines import HalfwaySkyline, Shortest
-from embodied.tasks.hari import hari_pool, hari_task
 
 CUR, GOAL, SUB = Intention.CUR, Intention.GOAL, Intention.SUB
 TASK = Task(

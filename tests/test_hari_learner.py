@@ -30,13 +30,12 @@ from embodied.agents.studies.engine import run_study
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant
 from embodied.envs.hari import Costs, HariEnv
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.house.house import House, Opening, Storey
-from embodied.identity import identity_of
 from embodied.interface import Ask, Candidates, Feature, FindObject, Intention, Move, Pose, Task
+from embodied.kinds.shipped.hari import PRETRAINING, hari_pool, hari_task
 from embodied.language.plain_language import PlainLanguage
-from embodied.records import read_json
-from embodied.tasks.hari import PRETRAINING, hari_pool, hari_task
+from embodied.records import identity_of, read_json
 
 SMALL = ExecutionConfig(
     hidden_size=32, layers=1, heads=2, dropout=0.0, learning_rate=2e-3, iterations=2, batch=8, validate_every=2

@@ -12,12 +12,11 @@ from embodied.agents.common.shipped import SHIPPED_HARI, WEIGHTS
 from embodied.agents.common.weights import origin_of
 from embodied.agents.hari.agent import HariAgent, load_agent
 from embodied.agents.hari.policy import policy_of
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.kinds import metrics
-from embodied.kinds.shipped.hari import HARI
+from embodied.kinds.shipped.hari import HARI, hari_pool, hari_task
 from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage
-from embodied.tasks.hari import hari_pool, hari_task
 
 
 @pytest.mark.parametrize("path", sorted(WEIGHTS.glob("*.safetensors")), ids=lambda p: p.stem)

@@ -13,16 +13,14 @@ from embodied.datasets.build import make_dataset_house
 from embodied.generate import HouseConfig
 from embodied.gym.playground import FLAT_AREA
 from embodied.language.clauses import Enter, Exit, Metres, Notice, Past, StopBy, StopHere, To, Turn
-from embodied.language.detokenize import detokenized
 from embodied.language.grammar import Phrase, kind_of, normalised, parse, say
 from embodied.language.lexicon import ROOM_NOUNS, UNFIT, lexicon_of
 from embodied.language.listener import count_cost, follow
 from embodied.language.people_language import People, RouteDescriber
-from embodied.language.plain_language import with_article
+from embodied.language.plain_language import detokenized, with_article
 from embodied.language.route_clauses import legs_of
-from embodied.language.speakers import SPEAKERS
 from embodied.language.surroundings import Lookout, doorway
-from embodied.language.templates import SPOKEN, TEMPLATES
+from embodied.language.templates import SPEAKERS, SPOKEN, TEMPLATES
 from embodied.world import open_world
 
 pytestmark = pytest.mark.slow

@@ -28,7 +28,7 @@ from embodied.assistants.ask import AskAssistant
 from embodied.envs.base import HelpEnv
 from embodied.errors import UnableError
 from embodied.evaluation import tables
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Reply, Route, Sighting, Step, Subtask, Usage
 from embodied.kinds import metrics
 from embodied.kinds.shipped.ask import ask_environments

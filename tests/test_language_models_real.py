@@ -17,7 +17,7 @@ from embodied.agents.language_models.agent import LanguageModelAgent
 from embodied.agents.language_models.assistant import ModelAssistant
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
 from embodied.cli.llm import SMOLLM, serving
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import Ask, Intention
 from embodied.kinds.metrics import usage
 from embodied.kinds.shipped.ask import ask_environments

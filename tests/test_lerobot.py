@@ -25,7 +25,7 @@ from embodied.datasets.lerobot import (
     seen,
     seen_depth,
 )
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.kinds.metrics import success
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
 from embodied.records import save_lines

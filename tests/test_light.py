@@ -31,7 +31,7 @@ from embodied.light.tracing.emitters import lamps_of, portals_of
 from embodied.light.tracing.sky import Outdoors, paint, sun_direction, sun_height
 from embodied.scene.landscapes import Scenery
 from embodied.scene.part import Part
-from embodied.threads import keep_drawing_to_threads, threads_allowed
+from embodied.software import keep_drawing_to_threads, threads_allowed
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
 
@@ -184,7 +184,7 @@ def test_cuda_goes_before_llvm_and_without_both_the_remedy_is_said():
 
 
 def test_a_process_takes_no_more_threads_than_it_is_given(monkeypatch):
-    monkeypatch.setattr("embodied.threads.processors", lambda: 3)
+    monkeypatch.setattr("embodied.software.processors", lambda: 3)
     nothing = dict.fromkeys(("", "0", "-2", "many"))
     for text, threads in {"1": 1, "2,4": 2, " 3 ": 3, "64": 3, **nothing}.items():
         monkeypatch.setenv("OMP_NUM_THREADS", text)
@@ -196,7 +196,7 @@ def test_a_process_takes_no_more_threads_than_it_is_given(monkeypatch):
 def test_drawing_keeps_to_the_threads_of_a_process(monkeypatch):
     told = []
     monkeypatch.setattr(cv2, "setNumThreads", told.append)
-    monkeypatch.setattr("embodied.threads.processors", lambda: 3)
+    monkeypatch.setattr("embodied.software.processors", lambda: 3)
     for given, mesa in ((None, None), ("1", "0"), ("2", "2")):
         monkeypatch.setenv("LP_NUM_THREADS", "")  # so that what was there comes back
         monkeypatch.delenv("LP_NUM_THREADS")

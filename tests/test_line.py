@@ -21,7 +21,7 @@ from embodied.assets.cache import digest
 from embodied.assets.catalogue import load_catalogue
 from embodied.cli import demo, main
 from embodied.envs.base import HelpEnv
-from embodied.evaluation.rollout import play, rollout
+from embodied.evaluation.evaluate import play, rollout
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.interface import Pose

@@ -24,7 +24,7 @@ from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.cli import main
 from embodied.datasets import build
 from embodied.datasets.store import Dataset
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import Move, Stop, act
 from embodied.kinds.metrics import spl, success
 from embodied.kinds.task_kind import TaskKind, kind_named, register_kind

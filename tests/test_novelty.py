@@ -18,8 +18,7 @@ from embodied.language import People
 from embodied.language.clauses import Enter, Forward, StopBy, To, Turn
 from embodied.language.grammar import NOVEL_TEMPLATES, NOVEL_WORDS, Phrase, say
 from embodied.language.lexicon import lexicon_of
-from embodied.language.speakers import SPEAKERS, draw_speaker
-from embodied.language.templates import TEMPLATES
+from embodied.language.templates import SPEAKERS, TEMPLATES, draw_speaker
 
 AREA = (50.0, 80.0)
 SEEDS = range(4)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from embodied.assets.closure import code_digest
-from embodied.distribution import DISTRIBUTION
+from embodied.software import DISTRIBUTION
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKED = ("agents", "assets", "embodied", "viz", "pyproject.toml", "setup.py", "README.md", "LICENSE")

@@ -7,8 +7,7 @@ import pytest
 from hand_data import built
 
 from embodied.datasets.parquet import PARQUET_TABLES, export_parquet, size_category
-from embodied.evaluation.evaluate import agent
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import agent, play
 from embodied.house.house import House
 from embodied.interface import Episode, Route, Task
 from embodied.records import from_json, save_lines

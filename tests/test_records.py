@@ -9,7 +9,7 @@ import pytest
 from conftest import two_rooms
 from hand_hanna import LINE_TASK, grid_setup, line_env
 
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.house.house import House
 from embodied.interface import Ask, Episode, FollowRoute, Move, Pose, Route, Stop, Task, Thought
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_at_random

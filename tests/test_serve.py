@@ -26,8 +26,7 @@ from embodied.envs.base import ActionError
 from embodied.errors import UnableError
 from embodied.geometry import wrap
 from embodied.interface import Ask, Episode, Intention, Thought
-from embodied.language.detokenize import detokenized
-from embodied.language.plain_language import PlainLanguage
+from embodied.language.plain_language import PlainLanguage, detokenized
 from embodied.language.utterances import PeoplesWords
 from embodied.policies.baselines import RandomWalk
 from embodied.records import load_lines, parse, to_json

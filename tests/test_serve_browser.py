@@ -12,7 +12,7 @@ import pytest
 from hand_serve import Served, gradient, make_data, write_study
 
 from embodied.envs.base import HelpEnv
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import Episode
 from embodied.policies.baselines import Forward10
 from embodied.records import load_lines, save_lines

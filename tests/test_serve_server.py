@@ -23,7 +23,7 @@ from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import feature_path, save_features
 from embodied.cli.serve import agents_of
 from embodied.datasets.store import Dataset
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import Episode
 from embodied.records import load_lines
 from embodied.render.pictures import Unlit

@@ -17,8 +17,8 @@ from embodied.agents.common.weights import load_weights, save_weights
 from embodied.agents.studies.engine import run_study
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
 from embodied.evaluation.tables import Samples
-from embodied.identity import identity_of
 from embodied.locks import LockedError, locked
+from embodied.records import identity_of
 
 FAR, NEAR = StudyRow("far", {"aim": 3.0}, x=3.0), StudyRow("near", {"aim": 1.0}, x=1.0)
 NOBODY = StudyRow("nobody", None)

@@ -10,8 +10,7 @@ from hand_data import DATA_KINDS
 from hand_worlds import grid_world
 
 from embodied.assistants.route_system import build_routes
-from embodied.evaluation.evaluate import agent
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import agent, play
 from embodied.interface import Ask, Move, Observation, Task
 from embodied.kinds import metrics
 from embodied.kinds.task_kind import EnvInputs, TaskInputs, kind_named

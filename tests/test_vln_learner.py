@@ -24,13 +24,12 @@ from embodied.agents.vln.policy import VlnMoment
 from embodied.agents.vln.run import VlnLearner, losses_of, teacher_share
 from embodied.assistants.route_system import build_routes
 from embodied.datasets.store import dataset_of
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import Move
-from embodied.kinds.shipped.vln import VLN
+from embodied.kinds.shipped.vln import VLN, vln_task
 from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage
 from embodied.policies.baselines import Forward10
-from embodied.tasks.vln import vln_task
 
 TINY = FollowerSettings(hidden_size=32, dropout=0.0, iterations=40, batch=12, learning_rate=5e-3, instruction_length=30)
 

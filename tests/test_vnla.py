@@ -12,7 +12,7 @@ from embodied.action_spaces import WORDS, MonocularMoves
 from embodied.assistants.advisor import Advisor
 from embodied.envs.base import ActionError
 from embodied.envs.vnla import RULES_OF_PLAY, Algorithm6Env, DirectVnlaEnv, MuteDirectVnlaEnv, VnlaEnv, fitted
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import Ask, FindObject, Mode, Move, Pose, Stop, Task, Thought
 from embodied.kinds import metrics
 from embodied.kinds.shipped.find import FIND

@@ -23,9 +23,9 @@ from embodied.agents.vnla.network import ASK, DONT, MOST_LEFT, NO_ASK, NO_MOVE, 
 from embodied.agents.vnla.policy import VnlaMoment, _decided, carried_out, for_training
 from embodied.agents.vnla.run import VnlaLearner, losses_of
 from embodied.envs.vnla import RULES_OF_PLAY
-from embodied.evaluation.rollout import play
-from embodied.identity import identity_of
+from embodied.evaluation.evaluate import play
 from embodied.interface import Ask
+from embodied.records import identity_of
 from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason
 
 quiet = lambda line: None

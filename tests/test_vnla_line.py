@@ -9,7 +9,7 @@ from hand_data import COMPACT, built, noise_features, small_house, validations_o
 
 from embodied.agents.vnla.agent import VnlaAgent
 from embodied.cli import main
-from embodied.identity import read_finished
+from embodied.records import read_finished
 
 pytestmark = pytest.mark.slow
 

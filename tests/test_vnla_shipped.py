@@ -12,7 +12,7 @@ from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VNLA
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vnla.agent import LEARNED, VnlaAgent
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import Episode
 from embodied.kinds.shipped.vnla import VNLA
 from embodied.kinds.task_kind import EnvInputs

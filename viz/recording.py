@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from embodied.action_spaces import doors_moved
 from embodied.interface import Ask, Close, Episode, Mode, Move, Open, Pose, Step, Stop, Task
 from embodied.kinds.task_kind import kind_named
-from embodied.language.detokenize import detokenized
+from embodied.language.plain_language import detokenized
 from embodied.navigation.doors import place_named, seen_name
 from embodied.navigation.free_space import EYE
 from embodied.render.camera import camera_at

@@ -14,7 +14,7 @@ from embodied.assets.cache import atomic_path
 from embodied.geometry import wrap
 from embodied.house.floor_plan import font
 from embodied.interface import Episode, Pose
-from embodied.language.detokenize import detokenized
+from embodied.language.plain_language import detokenized
 from embodied.navigation.graph import NavGraph
 
 FPS = 24

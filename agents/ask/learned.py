@@ -19,7 +19,7 @@ from embodied.agents.ask.config import AskerConfig
 from embodied.agents.ask.foresight import CHOICES, Choice, Foresight, carried_out, possible, thinks
 from embodied.agents.common.weights import load_weights, seeded
 from embodied.envs.base import HelpEnv
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import Action, Detection, Intention, Observation, Situation, Task
 from embodied.policies.ask import LIKELY, REACH, EpisodeMemory, reached
 from embodied.policies.baselines import PerEpisodePolicy

@@ -21,15 +21,13 @@ from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import StoredPlace
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.asking import late_env
-from embodied.evaluation.evaluate import spread
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play, spread
 from embodied.evaluation.tables import measured
 from embodied.generate import HouseConfig
-from embodied.identity import Identity, identity_of
 from embodied.interface import Agent, Task
 from embodied.kinds import metrics
 from embodied.kinds.shipped.ask import ASK, ask_environments
-from embodied.records import save_lines
+from embodied.records import Identity, identity_of, save_lines
 from embodied.tasks.ask import ask_split, look_of
 
 AREA = (90.0, 140.0)

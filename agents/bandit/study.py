@@ -21,7 +21,7 @@ from embodied.agents.common.session import Note
 from embodied.agents.studies.engine import Measured, StudyLearner
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
 from embodied.evaluation.tables import Samples
-from embodied.identity import identity_of, key_of
+from embodied.records import identity_of, key_of
 
 SENTENCE, HELD_OUT = "per-sentence BLEU", "held-out BLEU"
 PASSES = 5

@@ -32,7 +32,7 @@ from embodied.agents.common.losses import Decisions, actor_loss, critic_loss
 from embodied.agents.common.session import Note, Session, descend
 from embodied.agents.common.vocabulary import Vocabulary, most_frequent
 from embodied.agents.common.weights import weights_digest
-from embodied.identity import Identity, identity_of
+from embodied.records import Identity, identity_of
 from embodied.seeds import stream
 
 Step = Callable[[np.ndarray, int, int], Mapping[str, float]]

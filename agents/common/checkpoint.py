@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import torch
 
 from embodied.assets.cache import write_bytes
-from embodied.identity import CODE, MAKERS, Identity, differences
+from embodied.records import CODE, MAKERS, Identity, differences
 
 CHECKPOINT_FORMAT = "embodied-checkpoint-3"
 FIELDS = ("identity", "progress", "sums", "history", "parts")

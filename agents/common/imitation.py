@@ -29,10 +29,10 @@ from embodied.agents.common.session import (
 )
 from embodied.agents.common.settings import MAY_CHANGE
 from embodied.errors import UnableError
-from embodied.evaluation.rollout import play
-from embodied.identity import Identity
+from embodied.evaluation.evaluate import play
 from embodied.interface import Agent, Ask, Episode, Place, Task
 from embodied.kinds import metrics
+from embodied.records import Identity
 
 VALIDATION_BATCH = 32
 """Episodes evaluated in parallel; changes speed, not results."""

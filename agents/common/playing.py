@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from embodied.envs.base import HelpEnv
-from embodied.evaluation.rollout import rollout
+from embodied.evaluation.evaluate import rollout
 from embodied.interface import Actions, Agent, Episode, Observations, Place, Rngs, Situations, Task, act
 
 

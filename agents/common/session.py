@@ -23,9 +23,9 @@ import torch
 from embodied.agents.common.checkpoint import Stateful, restore, write_checkpoint
 from embodied.assets.cache import write_json
 from embodied.errors import UnableError
-from embodied.identity import Identity
 from embodied.interface import Episode
 from embodied.locks import locked
+from embodied.records import Identity
 from embodied.seeds import stream
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from embodied.agents.common.tensor_file import load_into
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.common.weights import half_precision, load_weights, save_weights, seeded
 from embodied.agents.common.word_vectors import use_vectors, vocabulary_with
-from embodied.identity import Identity
+from embodied.records import Identity
 
 
 @dataclass(frozen=True, kw_only=True)

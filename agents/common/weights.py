@@ -11,8 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from embodied.agents.common.tensor_file import checksum_of, load_tensors, save_tensors
-from embodied.identity import Identity
-from embodied.records import from_plain, parse, to_json
+from embodied.records import Identity, from_plain, parse, to_json
 
 WEIGHTS_FORMAT = "embodied-weights-1"
 RETIRED = ("varied_words",)

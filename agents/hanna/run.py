@@ -25,8 +25,8 @@ from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfi
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.datasets.store import Dataset
-from embodied.identity import identity_of
 from embodied.interface import Agent, Episode, Task, Teacher
+from embodied.records import identity_of
 from embodied.teachers.hanna import HannaTeacher
 
 

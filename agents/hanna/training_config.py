@@ -2,7 +2,7 @@
 
 Three rows of Table D.1 belong to the world and live there: gamma = 0.25 with the teacher
 (embodied.teachers.hanna), the attention radius with the assistant (embodied.assistants.anna), the
-success radius with the task (embodied.tasks.hanna).
+success radius with the task (embodied.kinds.shipped.hanna).
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from embodied.agents.common.weights import load_weights, save_weights, seeded
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.networks import INTENTIONS, ExecutionNetwork, RecurrentHead
 from embodied.agents.hari.words import FeatureWords
-from embodied.identity import Identity
+from embodied.records import Identity
 
 HARI_REMEDY = "train it again with `embodied train hari`"
 

@@ -27,10 +27,10 @@ from embodied.agents.hari.agent import HariAgent, save
 from embodied.agents.hari.networks import INTENTIONS, RecurrentHead
 from embodied.agents.hari.policy import Choice, policy_of
 from embodied.envs.hari import shaped_costs
-from embodied.evaluation.rollout import play
-from embodied.identity import Identity
+from embodied.evaluation.evaluate import play
 from embodied.interface import Action, Ask, Episode, Move, Place
 from embodied.kinds import metrics
+from embodied.records import Identity
 
 MAY_CHANGE = ("iterations", "checkpoint_minutes", "validate_every", "validation_tasks")
 

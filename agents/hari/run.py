@@ -22,10 +22,9 @@ from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules
-from embodied.evaluation.evaluate import spread
-from embodied.evaluation.rollout import play
-from embodied.identity import identity_of
+from embodied.evaluation.evaluate import play, spread
 from embodied.interface import Place
+from embodied.records import identity_of
 
 CONDITIONS = ("unseen_start", "unseen_object", "unseen_env")
 """Names of validation and test splits, after 'val_' and 'test_' (4.3.5)."""

@@ -28,8 +28,8 @@ from embodied.agents.studies.episodes import JUDGES, EpisodeStudy
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
 from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation.tables import Samples
-from embodied.identity import identity_of, key_of
 from embodied.interface import Agent, Episode
+from embodied.records import identity_of, key_of
 
 ACTIONS = ("CUR", "GOAL", "SUB", "DO")
 SUB_RULE = "SUB whenever possible"

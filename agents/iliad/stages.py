@@ -18,7 +18,7 @@ from embodied.agents.common.session import Note, Session, descend, seeded_dropou
 from embodied.agents.common.tensor_file import load_into, read_weights
 from embodied.agents.common.weights import origin_of, save_weights
 from embodied.agents.iliad.protocol import Tasks, one_request
-from embodied.identity import differences, identity_of
+from embodied.records import differences, identity_of
 from embodied.seeds import stream
 
 COOLDOWN = 0.4

@@ -20,7 +20,7 @@ from embodied.agents.iliad.training import train as learn
 from embodied.agents.studies.engine import Measured, StudyLearner
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
 from embodied.evaluation.tables import Samples
-from embodied.identity import identity_of, key_of
+from embodied.records import identity_of, key_of
 
 NEEDED = "thousand episodes to the threshold"
 LEARNING_ROWS = (

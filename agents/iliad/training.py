@@ -14,7 +14,7 @@ from embodied.agents.common.session import Note, Session, descend, seeded_dropou
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
 from embodied.agents.iliad.learners import IliadLesson, RequestBatch, adel, dagger, reinforce
 from embodied.agents.iliad.protocol import DescribingTeacher, Marginal, RequestWorld, Student, Tasks
-from embodied.identity import Identity
+from embodied.records import Identity
 from embodied.seeds import stream
 
 BATCH = 256

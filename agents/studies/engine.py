@@ -29,9 +29,18 @@ from embodied.agents.studies.pages import draw, page
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.assets.cache import digest, write_bytes, write_json
 from embodied.evaluation.tables import Samples, in_percent, interval, less
-from embodied.identity import CODE, MAKERS, Identity, finished, identity_of, key_of, read_finished, write_finished
 from embodied.locks import locked
-from embodied.records import from_plain
+from embodied.records import (
+    CODE,
+    MAKERS,
+    Identity,
+    finished,
+    from_plain,
+    identity_of,
+    key_of,
+    read_finished,
+    write_finished,
+)
 
 PRINTED = Path(__file__).parent / "data" / "printed.json"
 """Numbers of papers: table to row to column, in the table's own units."""

@@ -12,12 +12,10 @@ import torch
 from embodied.agents.studies.engine import Measured, StudyLearner
 from embodied.agents.studies.tables import StudyRow
 from embodied.datasets.store import Dataset, SplitData
-from embodied.evaluation.evaluate import evaluate, spread
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import evaluate, play, spread
 from embodied.evaluation.tables import measured
-from embodied.identity import Identity, identity_of
 from embodied.interface import Agent, Episode
-from embodied.records import save_lines
+from embodied.records import Identity, identity_of, save_lines
 
 JUDGES = ("embodied.evaluation.evaluate", "embodied.datasets.store")
 """Modules that decide how every agent is judged."""

@@ -26,7 +26,7 @@ from embodied.agents.vision.labels import SHELL, HouseStrips, visible_in_views
 from embodied.agents.vision.probe import average_precision
 from embodied.agents.vision.strip import STRIP_COLUMNS, cell_direction, inside_windows
 from embodied.agents.vision.training import StripBatch, classes_of, learn
-from embodied.identity import Identity, identity_of
+from embodied.records import Identity, identity_of
 from embodied.render.panorama import Panorama, Recognised
 
 WIDTH = 128

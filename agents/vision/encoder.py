@@ -20,7 +20,7 @@ from embodied.agents.common.weights import load_weights, save_weights
 from embodied.agents.vision.compact import COMPACT, Compact
 from embodied.agents.vision.lite import LITE, Lite, folded
 from embodied.agents.vision.strip import CELL, HEIGHT, STRIP_COLUMNS, STRIP_ROWS, WIDTH, inside_windows, windows
-from embodied.identity import Identity
+from embodied.records import Identity
 
 DIGESTED = "embodied-encoder-1"
 """The beginning of what digests of encoders are made of."""

@@ -22,8 +22,8 @@ from embodied.agents.vision.training import train_encoder, whitened
 from embodied.assets.cache import write_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
-from embodied.identity import Identity, identity_of
 from embodied.locks import locked
+from embodied.records import Identity, identity_of
 
 
 def train_vision(

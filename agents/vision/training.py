@@ -31,7 +31,7 @@ from embodied.agents.vision.lite import Lite, load_imagenet
 from embodied.agents.vision.strip import CELL, STRIP_COLUMNS
 from embodied.assets.cache import digest
 from embodied.assets.records import ROOM_KINDS
-from embodied.identity import Identity, identity_of
+from embodied.records import Identity, identity_of
 from embodied.seeds import stream
 
 

@@ -29,9 +29,9 @@ from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.policy import VlnMoment
-from embodied.identity import identity_of
 from embodied.interface import Agent, Episode, Task
-from embodied.tasks.vln import vln_task
+from embodied.kinds.shipped.vln import vln_task
+from embodied.records import identity_of
 
 LONGEST_EPISODE = 12
 """Steps of an episode of training: described paths have at most six, and who is lost learns little more."""

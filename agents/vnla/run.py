@@ -30,9 +30,9 @@ from embodied.agents.vnla.looking import lessons_of, reading_loss
 from embodied.agents.vnla.policy import VnlaMoment, for_training
 from embodied.assistants.advisor import HELP_STEPS
 from embodied.datasets.store import Dataset
-from embodied.identity import identity_of
 from embodied.interface import Agent, Episode
 from embodied.language.plain_language import PlainLanguage
+from embodied.records import identity_of
 from embodied.seeds import stream
 from embodied.teachers.vnla import VnlaTeacher
 

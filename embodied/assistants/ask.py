@@ -11,7 +11,7 @@ from embodied.geometry import wrap
 from embodied.house.house import Placement
 from embodied.interface import STEP, FindDescribed, Intention, Place, Reply, Situation, Subtask
 from embodied.language.plain_language import PlainLanguage
-from embodied.language.questions import intention_of
+from embodied.language.templates import intention_of
 from embodied.navigation.graph import nearest
 from embodied.tasks.ask import Look
 from embodied.tasks.goals import footprint_distance

@@ -25,8 +25,7 @@ from embodied.gym.sensors import CameraSensor, PanoramaStore, Sensor, ViewSettin
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Task
 from embodied.language.plain_language import PlainLanguage
-from embodied.mattersim.pictures import Skyboxes, skybox_folder
-from embodied.mattersim.skyboxes import write_skybox
+from embodied.mattersim.pictures import Skyboxes, skybox_folder, write_skybox
 from embodied.render.camera import Camera
 from embodied.render.classic import Renderer
 from embodied.render.panorama import VFOV36, Panorama, perspective_grid

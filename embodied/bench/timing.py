@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from embodied.threads import processors
+from embodied.software import processors
 
 
 @dataclass(frozen=True)

@@ -143,7 +143,7 @@ def inhabited(house: House, catalogue: Catalogue, args: DemoOptions) -> tuple[Ho
 
 def find_something(args: DemoOptions, world: World, viewers: tuple[str, ...]) -> dict:
     """The shortest-path agent walks to an object; recorded to episode.rrd."""
-    from embodied.evaluation.rollout import play
+    from embodied.evaluation.evaluate import play
     from embodied.kinds.shipped.find import FIND
     from embodied.kinds.task_kind import EnvInputs
     from embodied.language import People
@@ -166,11 +166,10 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route], viewe
     from embodied.agents.vision.detector import Detector
     from embodied.agents.vision.encoder import load_encoder
     from embodied.agents.vision.features import encode_panoramas
-    from embodied.evaluation.rollout import play
-    from embodied.kinds.shipped.hanna import HANNA
+    from embodied.evaluation.evaluate import play
+    from embodied.kinds.shipped.hanna import HANNA, hanna_pool, hanna_task
     from embodied.kinds.task_kind import EnvInputs
     from embodied.language import People
-    from embodied.tasks.hanna import hanna_pool, hanna_task
 
     agent, encoder = HannaAgent.load(SHIPPED_AGENT), load_encoder()
     nodes = bar(range(len(world.graph.ids)), "what the agent sees", "node")

@@ -20,9 +20,8 @@ from typing import Annotated
 
 from embodied.cli import message_of
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
-from embodied.distribution import DISTRIBUTION
 from embodied.options import Option, any_path
-from embodied.software import bring_atomic, load_atomic, unpack
+from embodied.software import DISTRIBUTION, bring_atomic, load_atomic, unpack
 
 LIBRARIES = (
     DISTRIBUTION, "mujoco-core", "opencv-python-headless", "gymnasium", "mitsuba", "numpy", "shapely",

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from embodied.agents.options import Threaded
-from embodied.distribution import DISTRIBUTION
 from embodied.errors import UnableError
 from embodied.options import Option, whole
+from embodied.software import DISTRIBUTION
 
 SMOLLM = "smollm2"
 CONTEXT = 2048

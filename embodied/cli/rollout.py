@@ -50,7 +50,7 @@ def run(args: RolloutOptions) -> None:
 def roll_out(args: RolloutOptions, viewers: tuple[str, ...]) -> None:
     """Play, film and record; recordings also go to `viewers`."""
     from embodied.envs.base import HelpEnv
-    from embodied.evaluation.rollout import play
+    from embodied.evaluation.evaluate import play
     from embodied.kinds.metrics import PER_EPISODE
     from embodied.language import People
     from embodied.policies.baselines import WITHOUT_LEARNING

@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from embodied.agents.language_models.client import WithModel, client_of
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
-from embodied.distribution import DISTRIBUTION
 from embodied.errors import UnableError
 from embodied.options import Count, Option, OutputFolder, any_path, whole
 from embodied.render.pictures import Baked, PictureSettings, Traced, matte, parse_pictures
 from embodied.serve.address import page_address
+from embodied.software import DISTRIBUTION
 
 if TYPE_CHECKING:
     from embodied.agents.language_models.client import Client

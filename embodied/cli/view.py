@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from embodied.datasets.store import Dataset
     from embodied.interface import Episode
     from embodied.render.pictures import PictureSettings
-    from embodied.viz.report import Listed
+    from embodied.viz.episode_log import Listed
     from embodied.viz.sinks import Sinks
 
 
@@ -43,7 +43,7 @@ class ViewOptions(Filmed, Viewers, Furnished, Printed):
 
 
 def run(args: ViewOptions) -> None:
-    from embodied.viz.report import load_run, summary_line
+    from embodied.viz.episode_log import load_run, summary_line
 
     if (args.folder / "vqa.json").exists():
         look(args)

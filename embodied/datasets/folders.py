@@ -403,7 +403,7 @@ def word_pieces() -> Callable[[Sequence[str]], list[list[int]]]:
 
 def _matterport(data: Dataset, root: Path) -> list[Path]:
     """Skyboxes of the panoramas that the data set holds, and the rooms of viewpoints."""
-    from embodied.mattersim.skyboxes import drawn, write_skyboxes  # late: decodes pictures
+    from embodied.mattersim.pictures import drawn, write_skyboxes  # late: decodes pictures
 
     files = []
     panoramas = {name: drawn(data.panoramas(name)) for name in names_of(data)}

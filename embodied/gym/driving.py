@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium import spaces
 
-from embodied.assistants.description_arrays import word_number
+from embodied.assistants.descriptions import word_number
 from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver, Roll
 from embodied.geometry import wrap
 from embodied.gym.sensors import LARGE, PIXELS, check_live, live_pixels

@@ -48,7 +48,7 @@ from embodied.house.house import House
 from embodied.interface import FeatureSource, Observation, Place, Pose, SeenPlace, Task
 from embodied.kinds.metrics import PER_EPISODE
 from embodied.kinds.task_kind import kind_named
-from embodied.language.detokenize import detokenized
+from embodied.language.plain_language import detokenized
 from embodied.navigation.doors import place_named
 from embodied.scene.house_meshes import instance_classes
 from embodied.seeds import checked_seed

@@ -20,7 +20,7 @@ from gymnasium.vector.utils import batch_space, create_empty_array
 
 from embodied.gym.env import OWN, HelpGymEnv, check_options, open_resources
 from embodied.gym.sensors import Sensor, SensorSuite
-from embodied.threads import processors
+from embodied.software import processors
 
 if TYPE_CHECKING:
     from embodied.world import World

@@ -28,12 +28,11 @@ from embodied.language.clauses import (
     side_of,
 )
 from embodied.language.lexicon import PASSAGES, ROOM_NOUNS, ROOM_OF_NOUN, Lexicon, Word
-from embodied.language.speakers import NOVEL_HABIT
-from embodied.language.templates import SPOKEN, TEMPLATES, Template
+from embodied.language.templates import NOVEL_HABIT, SPOKEN, TEMPLATES, Template
 from embodied.novelty import novel_among, of_novelty
 
 if TYPE_CHECKING:
-    from embodied.language.speakers import Speaker
+    from embodied.language.templates import Speaker
 
 
 @dataclass(frozen=True)

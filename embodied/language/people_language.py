@@ -12,8 +12,8 @@ from embodied.language.lexicon import lexicon_of
 from embodied.language.listener import carry_out
 from embodied.language.plain_language import PlainLanguage
 from embodied.language.route_clauses import plan, shortened
-from embodied.language.speakers import draw_speaker
 from embodied.language.surroundings import Lookout
+from embodied.language.templates import draw_speaker
 from embodied.novelty import check_novelty
 
 GROWTH = (0, 0, 1, 1, 2, 3, 4, 6)

@@ -1,4 +1,4 @@
-"""The plainest voice: requests, turns and room names, without landmarks or style."""
+"""The plainest voice: requests, turns and room names, without landmarks or style; articles, plurals and blanks."""
 
 from __future__ import annotations
 
@@ -134,3 +134,8 @@ def plural(noun: str) -> str:
     else:
         last += "s"
     return f"{before}{last}{after}"
+
+
+def detokenized(text: str) -> str:
+    """'go into the hall . turn left' becomes 'go into the hall. turn left': no blanks before punctuation."""
+    return re.sub(r" +([.,;:?!]+)(?=\s|$)", r"\1", text)

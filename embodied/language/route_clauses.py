@@ -34,9 +34,8 @@ from embodied.language.clauses import (
 from embodied.language.grammar import Phrase
 from embodied.language.lexicon import PASSAGES, Lexicon, Word, lexicon_of, says
 from embodied.language.listener import ARRIVAL_DISTANCE, PASSING_DISTANCE
-from embodied.language.speakers import Speaker
 from embodied.language.surroundings import Lookout, Surroundings, VisibleThing, doorway
-from embodied.language.templates import SPOKEN
+from embodied.language.templates import SPOKEN, Speaker
 
 SLIGHT, SHARP, BACK = math.radians(38), math.radians(66), math.radians(140)
 """Smallest angles called 'slightly', a turn, and turning around."""

@@ -23,8 +23,7 @@ from numpy.typing import ArrayLike
 
 from embodied.errors import UnableError
 from embodied.light.arrays import Array, Ray, RayScene
-from embodied.software import bundled, load_atomic
-from embodied.threads import threads_allowed
+from embodied.software import bundled, load_atomic, threads_allowed
 
 _LLVM_PLACES = (
     "/usr/lib/*/libLLVM*.so*",

@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 
 from embodied.mattersim.graphs import Graphs, listed_scans, load_graphs
-from embodied.mattersim.motion import DiscreteViews, counted_steps, sign_steps
 from embodied.mattersim.pictures import Skyboxes
-from embodied.mattersim.sight import ViewPoint, lookout
+from embodied.mattersim.sight import DiscreteViews, ViewPoint, counted_steps, lookout, sign_steps
 from embodied.seeds import stream
 
 Draw = Callable[[str, str, float, float, float, tuple[int, int]], np.ndarray]

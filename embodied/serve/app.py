@@ -26,9 +26,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from embodied.envs.base import ActionError
 from embodied.records import parse, to_json
 from embodied.serve.address import origin_of, page_address
-from embodied.serve.driving import Live
+from embodied.serve.driving import EncodedPanoramas, Live
 from embodied.serve.game import Game
-from embodied.serve.pictures import EncodedPanoramas
 from embodied.serve.results import summary
 from embodied.serve.screens import houses_of, live_name, next_part, plan_of, screen_of
 from embodied.serve.sessions import Person, Sessions

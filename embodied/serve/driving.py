@@ -1,4 +1,4 @@
-"""Driving in the browser: a body that goes a step ahead or turns, and live pictures of what it sees.
+"""Pictures that people see in the browser: stored panoramas, and live ones of a body that goes ahead or turns.
 
 The episode stays one of viewpoints: somebody who drives has moved to a viewpoint once it is the nearest that they could
 go straight to. Assistants, measures and learners need not know how people moved.
@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import asyncio
 import functools
+import hashlib
+import hmac
 import math
 import time
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 
+import cv2
 import numpy as np
 
 from embodied.envs.continuous import Body, NavMeshCache
@@ -21,6 +24,7 @@ from embodied.errors import UnableError
 from embodied.interface import Place, Pose
 from embodied.render.camera import camera_at
 from embodied.render.jpeg import jpeg
+from embodied.render.panorama_file import PanoramaFile, beside
 from embodied.world import World
 
 ACTIONS = ("Go ahead", "Turn left", "Turn right")
@@ -30,7 +34,7 @@ BODY = Body()
 LIVE_SIZE = (240, 320)
 """Height and width of a live picture, pixels."""
 LIVE_VFOV = math.radians(62.0)
-QUALITY = 70
+LIVE_QUALITY = 70
 SLOWEST = 2.0
 """Seconds for a picture from which on a machine is too slow to drive on."""
 LIVE_KEPT = 64
@@ -109,4 +113,41 @@ class Live:
     def _draw(self, eye: Eye) -> bytes:
         name, x, y, z, yaw = eye
         rgb = self._world(name).renderer.rgb(camera_at((x, y, z), yaw, 0.0, LIVE_VFOV), LIVE_SIZE)
-        return jpeg(rgb, QUALITY)
+        return jpeg(rgb, LIVE_QUALITY)
+
+
+FACE_SIZES = {"small": 128, "large": 768}
+"""Name to the largest side of a face, pixels."""
+QUALITY = {"small": 60, "large": 82}
+ENCODED_KEPT = 600
+"""Encoded panoramas held in memory: some 100 MB."""
+
+
+class EncodedPanoramas:
+    """The panoramas of the study's houses; nothing else can be asked for."""
+
+    def __init__(self, files: Mapping[str, PanoramaFile], secret: str) -> None:
+        """
+        Args:
+          files: by house.
+          secret: makes the names; only who was shown a viewpoint knows that of its panorama.
+        """
+        self._files, self._secret = files, secret.encode()
+        self._place = {self.name(w, n): (w, n) for w, file in files.items() for n in range(len(file))}
+        self.encoded = functools.lru_cache(maxsize=ENCODED_KEPT)(self._encode)
+
+    def name(self, world: str, node: int) -> str:
+        """Of the panorama of a viewpoint, in addresses."""
+        return hmac.new(self._secret, f"{world}/{node}".encode(), hashlib.sha256).hexdigest()[:24]
+
+    def has(self, name: str, size: str) -> bool:
+        return name in self._place and size in FACE_SIZES
+
+    def _encode(self, name: str, size: str) -> bytes:
+        """A JPEG of the faces in the order of embodied.render.panorama.FACES."""
+        world, node = self._place[name]
+        faces = self._files[world].rgb(node)
+        side = min(FACE_SIZES[size], faces.shape[1])
+        if side != faces.shape[1]:
+            faces = np.stack([cv2.resize(f, (side, side), interpolation=cv2.INTER_AREA) for f in faces])
+        return jpeg(beside(faces), QUALITY[size], cv2.IMWRITE_JPEG_OPTIMIZE, 1)

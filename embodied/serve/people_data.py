@@ -21,6 +21,7 @@ from embodied.datasets.checks import DatasetError
 from embodied.datasets.store import SUBGOALS, Dataset
 from embodied.interface import STEP, Episode, Pose, Route, Task
 from embodied.kinds.metrics import sdtw, without_repeats
+from embodied.kinds.shipped.vln import vln_task
 from embodied.language.plain_language import PlainLanguage
 from embodied.language.utterances import Utterance
 from embodied.navigation.graph import nearest
@@ -28,7 +29,6 @@ from embodied.records import load_json, load_lines, save_lines
 from embodied.seeds import stream
 from embodied.serve.results import JUDGEMENTS, Judgement
 from embodied.serve.talk import PERSON_SUBTASK
-from embodied.tasks.vln import vln_task
 from embodied.teachers.vnla import VnlaTeacher
 
 

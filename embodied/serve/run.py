@@ -15,9 +15,8 @@ from embodied.interface import Episode
 from embodied.records import load_lines, to_json
 from embodied.render.panorama_file import PanoramaFile
 from embodied.serve.app import Server, key_of
-from embodied.serve.driving import BrowserBody, Live
+from embodied.serve.driving import BrowserBody, EncodedPanoramas, Live
 from embodied.serve.game import POLICIES, AgentMaker, AssistantMaker, set_table
-from embodied.serve.pictures import EncodedPanoramas
 from embodied.serve.results import ResultsWriter
 from embodied.serve.sessions import Sessions
 from embodied.serve.store import Store

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from embodied.interface import Ask, Mode, Move, Observation, Place, Pose, Situation, Step, viewpoint
-from embodied.language.detokenize import detokenized
-from embodied.serve.driving import ACTIONS
+from embodied.language.plain_language import detokenized
+from embodied.serve.driving import ACTIONS, EncodedPanoramas
 from embodied.serve.game import Game
-from embodied.serve.pictures import EncodedPanoramas
 from embodied.serve.sessions import STARS, Person, Sessions
 from embodied.serve.study import StudyPart
 from embodied.serve.talk import way_to_goal

@@ -32,9 +32,9 @@ from embodied.agents.vision.drawn import drawings_of
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.tables import Samples
-from embodied.identity import identity_of
 from embodied.interface import SeenPlace
 from embodied.language.people_language import RouteDescriber
+from embodied.records import identity_of
 from embodied.seeds import stream
 
 VALIDATION_TRIPS = 300

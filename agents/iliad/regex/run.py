@@ -28,7 +28,7 @@ from embodied.agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher
 from embodied.agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld
 from embodied.agents.iliad.training import IliadProblem, successes
 from embodied.evaluation.tables import Samples
-from embodied.identity import identity_of
+from embodied.records import identity_of
 from embodied.seeds import stream
 
 VALIDATION_REQUESTS = 500

@@ -131,7 +131,7 @@ class LeRobotOptions(OfData):
 def run_lerobot(args: LeRobotOptions) -> None:
     from embodied.datasets.lerobot import RecordedCamera, export_lerobot
     from embodied.datasets.store import Dataset
-    from embodied.evaluation.rollout import play
+    from embodied.evaluation.evaluate import play
     from embodied.interface import Episode
     from embodied.kinds.metrics import success
     from embodied.records import load_lines

@@ -17,13 +17,13 @@ from embodied.datasets.vqa.walks import GLIMPSE, Walk
 from embodied.geometry import wrap
 from embodied.house.house import House, Placement
 from embodied.house.shapes import footprint
-from embodied.language import speakers
+from embodied.language import templates
 from embodied.language.clauses import Referent
 from embodied.language.lexicon import ROOM_NOUNS, UNFIT, Word, lexicon_of, says
 from embodied.language.plain_language import plural, with_article
 from embodied.navigation.graph import NavGraph
 
-ASKING: Mapping[str, Any] = read_toml(Path(speakers.__file__).with_name("vqa.toml"))
+ASKING: Mapping[str, Any] = read_toml(Path(templates.__file__).with_name("vqa.toml"))
 """Type to habit to templates; and 'alike', groups of classes that people do not tell apart."""
 ALIKE: Mapping[str, list[str]] = {name: group for group in ASKING["alike"] for name in group}
 
@@ -38,7 +38,7 @@ class WalkScene:
     def __init__(self, walk: Walk, house: House, graph: NavGraph, catalogue: Catalogue) -> None:
         self.walk, self.house, self.graph, self.elsewhere = walk, house, graph, list[str]()
         self.lexicon, self.assets = lexicon_of(catalogue), {p.id: catalogue.assets[p.asset] for p in house.placements}
-        self.kind, self.by, self.rng = "", speakers.SPEAKERS[0], np.random.default_rng(0)
+        self.kind, self.by, self.rng = "", templates.SPEAKERS[0], np.random.default_rng(0)
         self.clear = _firsts(f.clear for f in walk.frames)
         self.glimpsed = _firsts([o for o, share in f.shares.items() if share >= GLIMPSE] for f in walk.frames)
         self.things = [p for p in house.placements if p.id in self.clear and p.object_class not in UNFIT]
@@ -49,7 +49,7 @@ class WalkScene:
     def asked(self, kind: str, rng: np.random.Generator) -> WalkScene:
         """The scene for somebody drawn who asks questions of a type."""
         scene = copy.copy(self)
-        scene.kind, scene.rng, scene.by = kind, rng, speakers.draw_speaker(rng)
+        scene.kind, scene.rng, scene.by = kind, rng, templates.draw_speaker(rng)
         return scene
 
     def ask(self, answer: str, about: Iterable[str], others: Any = (), fact: str = "", **slots: str) -> VqaQuestion:

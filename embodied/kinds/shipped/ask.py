@@ -10,8 +10,7 @@ import numpy as np
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.ask import QUESTIONS, AskAssistant
-from embodied.assistants.description_arrays import DESCRIPTION_ROWS, description_rows
-from embodied.assistants.descriptions import Describer
+from embodied.assistants.descriptions import DESCRIPTION_ROWS, Describer, description_rows
 from embodied.envs.ask import AskEnv, AskSettings
 from embodied.interface import Assistant, Episode, Observation, Place, Stop
 from embodied.kinds.metrics import asked, success

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna
-from embodied.envs.hanna import HannaEnv
-from embodied.interface import Ask, Episode, Mode, Move, Stop
+from embodied.envs.base import HelpEnv, required
+from embodied.interface import Ask, Episode, Mode, Move, Place, Reply, Stop, Viewpoint
 from embodied.kinds.splits import five_splits
 from embodied.kinds.task_kind import (
     PLAIN_AGENTS,
@@ -32,7 +34,8 @@ from embodied.policies.baselines import (
     never_ask,
 )
 from embodied.policies.listeners import ListeningInterpreter
-from embodied.tasks.hanna import hanna_pool, hanna_task
+from embodied.tasks.find import FindConfig, Pool, build_pool, find_task
+from embodied.tasks.goals import find_instances, goal_classes
 
 TABLE_4_2 = {"train": 51, "val": 7, "test": 10}, five_splits(82_484, 5_001, 5_017, 5_004, 5_012)
 """Houses and splits of the dissertation's Table 4.2."""
@@ -40,9 +43,47 @@ NEAR_ENOUGH = 2.0
 """Metres from the target of a sub-task within which it succeeded."""
 
 
+LIMITS = FindConfig("hanna", reach=2.5, fewest_nodes=5, most_nodes=15, radius=2.0, horizon=50)
+"""Limits of 4.2.5 and Table D.1; training takes 20 steps. An instance counts when a node of its room is within reach;
+that node is its goal."""
+
+
+def hanna_pool(world: Place, *, seed: int) -> Pool:
+    classes = goal_classes(find_instances(world, LIMITS.reach), by_room=False, nearest_only=True)
+    return build_pool(world, classes, seed=seed, fewest=LIMITS.fewest_nodes, most=LIMITS.most_nodes, kind=LIMITS.kind)
+
+
+hanna_task = functools.partial(find_task, config=LIMITS)
+"""Task `index` of the pool, as find_task."""
+
+
 def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
     pool = hanna_pool(inputs.world, seed=inputs.seed)
     return parts_of_pool(len(pool), lambda i: hanna_task(pool, i, seed=inputs.seed, language=inputs.language), parts)
+
+
+class HannaEnv(HelpEnv):
+    """Algorithm 7 of dissertation 4.2.2: two modes, people who know routes, images of where to go."""
+
+    def _replied(self, reply: Reply) -> None:
+        subtask = required(reply.subtask, "sub-task in the reply")
+        self.mode = Mode.SUB  # line 9
+        self.instruction = required(reply.text, "text in the reply")  # line 11
+        self.target = reply.image  # line 12: I^depart
+        self.subtask, self.targets = subtask, (subtask.target,)
+        self.pose = subtask.start or self.pose  # line 13: step to the start of the route and look along it
+        self.time_on_task = 0
+
+    def _stopped(self) -> None:
+        if self.mode is Mode.MAIN:  # lines 17-18
+            self.ended = "stop"
+            return
+        self.mode = Mode.MAIN  # line 20
+        self.instruction = self.task.request  # line 21
+        goal = required(required(self.subtask, "sub-task").goal, "goal of the sub-task")
+        self.target = Viewpoint(self.task.world, goal)  # line 22: I^{g*}, Eq 4.7
+        self.targets, self.subtask = (goal,), None  # the program's teacher (docs/sources.md, S14)
+        self.time_on_task = 0
 
 
 def environments(inputs: EnvInputs) -> EnvMaker:

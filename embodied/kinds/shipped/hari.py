@@ -10,8 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.assistants.description_arrays import DESCRIPTION_ROWS, description_rows
-from embodied.assistants.descriptions import Describer, frequent_classes
+from embodied.assistants.descriptions import DESCRIPTION_ROWS, Describer, description_rows, frequent_classes
 from embodied.assistants.hari import HariAssistant, Uncooperative
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
 from embodied.interface import Intention, Observation, Place, Task
@@ -33,9 +32,8 @@ from embodied.kinds.task_kind import (
 )
 from embodied.policies.baselines import HalfwaySkyline, RandomWalk, Shortest
 from embodied.seeds import stream
-from embodied.tasks.find import Pool
-from embodied.tasks.hari import HARI as LIMITS
-from embodied.tasks.hari import PRETRAINING, hari_pool, hari_task
+from embodied.tasks.find import FindConfig, Pool, build_pool, find_task
+from embodied.tasks.goals import GoalClass, find_instances
 
 HELD_OBJECTS = 0.15
 """Share of object classes that training never asks for, for validation and for test each."""
@@ -44,6 +42,24 @@ UNSEEN = "main_unseen"
 
 
 # Tasks ------------------------------------------------------------------------------------------
+
+
+LIMITS = FindConfig("hari", reach=2.5, fewest_nodes=5, most_nodes=10, horizon=30)
+"""Limits of 4.3.5 and Table E.2; success is to end exactly at the intended node."""
+PRETRAINING = dataclasses.replace(LIMITS, fewest_nodes=1)
+"""Of pre-training (appendix E)."""
+
+
+def hari_pool(world: Place, *, seed: int, config: FindConfig = LIMITS) -> Pool:
+    """One request per object instance: the node nearest to it is what the human has in mind."""
+    classes = tuple(
+        GoalClass(x.object_class, x.room_kind, (x.placement,), x.nodes[:1]) for x in find_instances(world, config.reach)
+    )
+    return build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_nodes, kind="hari")
+
+
+hari_task = functools.partial(find_task, config=LIMITS)
+"""Task `index` of the pool, as find_task."""
 
 
 def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:

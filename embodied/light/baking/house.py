@@ -57,7 +57,7 @@ from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 from embodied.seeds import stream
-from embodied.threads import processors
+from embodied.software import processors
 
 log = logging.getLogger(__name__)
 Progress = Callable[[str, float], None]

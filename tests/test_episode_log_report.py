@@ -6,7 +6,7 @@ import pytest
 
 from embodied.interface import Episode, FindObject, Pose, Task
 from embodied.records import RecordError, save_lines
-from embodied.viz.report import load_run
+from embodied.viz.episode_log import load_run
 
 TASK = Task("a/find/1", "find", "a", Pose(0), FindObject("mug", None, ("mug_1",)), (1,), "find a mug", 0.0, 9)
 

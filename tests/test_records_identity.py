@@ -7,8 +7,16 @@ from dataclasses import dataclass
 
 import pytest
 
-from embodied.identity import CODE, differences, finished, identity_of, key_of, read_finished, write_finished
-from embodied.records import RecordError
+from embodied.records import (
+    CODE,
+    RecordError,
+    differences,
+    finished,
+    identity_of,
+    key_of,
+    read_finished,
+    write_finished,
+)
 
 
 @dataclass(frozen=True)
