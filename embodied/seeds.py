@@ -1,9 +1,11 @@
-"""The one source of randomness: named generators derived from an integer seed."""
+"""The one source of randomness: named generators derived from an integer seed. And what is kept from learning."""
 
 from __future__ import annotations
 
 import hashlib
 import operator
+from collections.abc import Collection, Iterable, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -43,3 +45,41 @@ def stream(seed: int, *names: str | int) -> np.random.Generator:
     text = "\x1f".join([f"{checked_seed(seed):d}", *(f"{type(n).__name__}:{n}" for n in names)])
     words = np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype="<u4")
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(words.tolist())))
+
+
+T = TypeVar("T")
+FAMILIAR, NOVEL = "familiar", "novel"
+NOVELTIES = (FAMILIAR, NOVEL)
+SHARE = 0.25
+"""Of several alternatives, how many are novel."""
+FEWEST = 4
+"""Fewer alternatives than these are not divided: one of two toilets does not fit every house."""
+
+
+def novel_among(names: Iterable[str]) -> frozenset[str]:
+    """A quarter of several alternatives; nothing where they are fewer than FEWEST.
+
+    It depends on the names alone: not on their order, the seed of a data set or the process.
+    """
+    known = sorted(set(names))
+    if len(known) < FEWEST:
+        return frozenset()
+    drawn = sorted(known, key=lambda name: float(stream(0, NOVEL, name).random()))
+    return frozenset(drawn[: round(SHARE * len(known))])
+
+
+def of_novelty(items: Sequence[T], novel: Collection[T], novelty: str | None) -> Sequence[T]:
+    """Those of `items` that are of this novelty; all of them for None, and where there are no such."""
+    if novelty is None:
+        return items
+    return [x for x in items if (x in novel) == (novelty == NOVEL)] or items
+
+
+def check_novelty(novelty: str | None) -> None:
+    """Refuse an unknown one.
+
+    Raises:
+      ValueError: neither None nor one of NOVELTIES.
+    """
+    if novelty not in (None, *NOVELTIES):
+        raise ValueError(f"novelty should be None or one of {NOVELTIES}, got {novelty!r}")

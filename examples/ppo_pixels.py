@@ -62,7 +62,7 @@ from embodied.interface import TURNS, FeatureSource, FollowRoute, Pose, Sight, T
 from embodied.language.plain_language import PlainLanguage
 from embodied.render.pictures import parse_pictures
 from embodied.seeds import stream
-from embodied.tasks.find import FindConfig, find_pool, find_task
+from embodied.tasks.goals import FindConfig, find_pool, find_task
 from embodied.world import World, open_world
 
 LAYOUT = SpaceLayout(candidates=5, text=200)

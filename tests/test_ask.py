@@ -25,8 +25,7 @@ from embodied.cli import main as start
 from embodied.envs.ask import AskSettings, Prices
 from embodied.evaluation import tables
 from embodied.evaluation.asking import ask_counts, late_env
-from embodied.evaluation.evaluate import play
-from embodied.evaluation.own_agents import read_seeds, submitted
+from embodied.evaluation.evaluate import play, read_seeds, submitted
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.sensors import SensorSuite
 from embodied.gym.spaces import SpaceLayout, number

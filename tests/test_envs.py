@@ -13,8 +13,7 @@ from embodied.envs.base import ActionError, HelpEnv, TaskError
 from embodied.interface import Ask, Move, Pose, Stop
 from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import count_hops
-from embodied.tasks.find import find_pool, find_task
-from embodied.tasks.goals import find_instances
+from embodied.tasks.goals import find_instances, find_pool, find_task
 
 
 def find_tasks(world, n: int = 30):

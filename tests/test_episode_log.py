@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hand_worlds import line_world
 
-from embodied.assistants.words import described
+from embodied.assistants.descriptions import described
 from embodied.interface import (
     Ask,
     Feature,

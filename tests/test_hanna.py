@@ -31,7 +31,7 @@ from embodied.policies.baselines import (
     never_ask,
 )
 from embodied.seeds import stream
-from embodied.teachers.hanna import HannaTeacher, base37_entropy, lost_as_programmed, segments
+from embodied.teachers.shortest import HannaTeacher, base37_entropy, lost_as_programmed, segments
 from embodied.viz.video import _captions, film_episode
 
 # ANNA

@@ -54,7 +54,7 @@ from embodied.kinds.shipped.hanna import HannaEnv, hanna_pool, hanna_task
 from embodied.language.plain_language import PlainLanguage
 from embodied.locks import LockedError, locked
 from embodied.records import identity_of
-from embodied.teachers.hanna import HannaTeacher
+from embodied.teachers.shortest import HannaTeacher
 
 torch.set_num_threads(1)
 

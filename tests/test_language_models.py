@@ -38,7 +38,7 @@ from embodied.language import PlainLanguage
 from embodied.records import from_json, to_json
 from embodied.render.panorama import Panorama
 from embodied.tasks.ask import ask_pool, ask_tasks, look_of
-from embodied.tasks.find import find_pool, find_task
+from embodied.tasks.goals import find_pool, find_task
 
 ONE = object_schema(word={"type": "string", "enum": ["yes", "no"]})
 ASKED = [{"role": "user", "content": "say it"}]

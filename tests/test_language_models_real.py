@@ -26,7 +26,7 @@ from embodied.kinds.task_kind import EnvInputs
 from embodied.language import PlainLanguage
 from embodied.records import to_json
 from embodied.tasks.ask import ask_pool, ask_tasks, look_of
-from embodied.tasks.find import find_pool, find_task
+from embodied.tasks.goals import find_pool, find_task
 
 pytestmark = pytest.mark.slow
 

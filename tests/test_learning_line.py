@@ -32,7 +32,7 @@ from embodied.datasets.store import dataset_of
 from embodied.evaluation.evaluate import evaluate
 from embodied.interface import Mode, Stop
 from embodied.records import read_json
-from embodied.teachers.hanna import segments
+from embodied.teachers.shortest import segments
 
 pytestmark = pytest.mark.slow
 

@@ -30,11 +30,10 @@ from embodied.language import People
 from embodied.policies.baselines import RandomWalk, Shortest
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import Baked
-from embodied.tasks.find import find_pool, find_task
+from embodied.tasks.goals import find_pool, find_task
 from embodied.viz import house3d, recording
-from embodied.viz.blueprint import blueprint_of, sees_title
 from embodied.viz.recording import PictureSizes, camera_axes, record
-from embodied.viz.sinks import Sinks, checked_viewer, listens, open_recording
+from embodied.viz.sinks import Sinks, blueprint_of, checked_viewer, listens, open_recording, sees_title
 from embodied.viz.video import camera_track, write_video
 from embodied.world import open_world
 

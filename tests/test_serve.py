@@ -26,11 +26,10 @@ from embodied.envs.base import ActionError
 from embodied.errors import UnableError
 from embodied.geometry import wrap
 from embodied.interface import Ask, Episode, Intention, Thought
+from embodied.language.people_language import PeoplesWords
 from embodied.language.plain_language import PlainLanguage, detokenized
-from embodied.language.utterances import PeoplesWords
 from embodied.policies.baselines import RandomWalk
 from embodied.records import load_lines, parse, to_json
-from embodied.serve.address import page_address
 from embodied.serve.app import app_of
 from embodied.serve.driving import ACTIONS
 from embodied.serve.game import Game, set_table
@@ -40,7 +39,7 @@ from embodied.serve.run import open_study
 from embodied.serve.screens import screen_of
 from embodied.serve.sessions import Sessions
 from embodied.serve.store import Event
-from embodied.serve.study import Question, StudyError, StudyPart, load_study
+from embodied.serve.study import Question, StudyError, StudyPart, load_study, page_address
 from embodied.serve.talk import spoken_reply
 from embodied.teachers.vnla import VnlaTeacher
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from embodied.assistants.words import described
+from embodied.assistants.descriptions import described
 from embodied.interface import Ask, Episode, Intention, Mode, Place, Pose, Reply, Step, Task, Viewpoint
 from embodied.kinds.task_kind import kind_named
 from embodied.language.plain_language import detokenized

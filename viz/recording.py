@@ -29,10 +29,9 @@ from embodied.render.camera import camera_at
 from embodied.render.jpeg import jpeg
 from embodied.render.panorama import Panorama, Recognised
 from embodied.render.photograph import PhotoCamera
-from embodied.viz.blueprint import blueprint_of
 from embodied.viz.episode_log import EpisodeLog, question_of
 from embodied.viz.house3d import light_meshes, lit_meshes, log_house
-from embodied.viz.sinks import Sinks, open_recording
+from embodied.viz.sinks import Sinks, blueprint_of, open_recording
 from embodied.world import World
 
 PALETTE = {

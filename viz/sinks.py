@@ -1,4 +1,4 @@
-"""Targets of a recording: a file, running viewers, or several of them."""
+"""Targets of a recording, a file, running viewers, or several of them, and how viewers lay it out."""
 
 from __future__ import annotations
 
@@ -9,11 +9,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from rerun.blueprint.encodings import TextLogColumn
 
 from embodied.assets.cache import atomic_path
 from embodied.errors import UnableError
+from embodied.house.house import House
+from embodied.interface import Ask, Episode
+from embodied.kinds.task_kind import kind_named
+from embodied.render.pictures import PictureSettings
 
 APPLICATION = "embodied"
 PORT = 9876
@@ -106,3 +112,105 @@ def listens(host: str, port: int) -> bool:
     except OSError:
         return False
     return True
+
+
+LIGHT = {"unlit": "without light", "fast": "lit, fast", "normal": "lit", "traced": "lit, ray-traced"}
+"""How a house is drawn, for people."""
+
+
+def sees_title(seen: PictureSettings | None) -> str:
+    """Name of the picture along the agent's gaze: how it is drawn, or that the agent looks at none."""
+    if seen is None:
+        return "Ahead of the agent, which looks at no pictures"
+    return f"What the agent sees: {LIGHT.get(seen.word, seen.word)}"
+
+
+def blueprint_of(house: House, episode: Episode, seen: PictureSettings | None = None) -> rrb.Blueprint:
+    """The layout for a finished episode: the house in 3D on the left, what the agent sees and hears on the right, plots
+    below; with an assistant's image and probabilities where it has them.
+
+    Args:
+      house: decides where the eye starts.
+      seen: how the pictures are drawn that the agent looks at; None if it looks at none.
+    """
+    kind, steps = kind_named(episode.task.kind), episode.steps
+    dialogue = kind.story.dialogue or any(isinstance(s.action, Ask) for s in steps)
+    target = any(s.reply is not None and s.reply.image is not None for s in steps)
+    thought = any(s.action.thought is not None and s.action.thought.asks for s in steps)
+    stack, monocular = kind.story.goal_stack, kind.monocular
+    world = _house_view(house)
+    ahead = rrb.Spatial2DView(origin="/agent/camera/image", name=sees_title(seen))
+    around = "Around it, which it does not see" if monocular else "Panorama, gaze in the middle"
+    panorama = rrb.Spatial2DView(origin="/view/panorama", name=around)
+    sent = [rrb.Spatial2DView(origin="/view/target", name="Image of where to go")] if target else []
+    texts = [
+        rrb.TextDocumentView(origin="/text/request", name="Request"),
+        rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
+    ]
+    if stack:
+        texts = [
+            rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
+            rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first"),
+        ]
+    plots = _plots(thought, stack, budget=episode.budget is not None)
+    dialogue_view = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
+    right = rrb.Vertical(
+        rrb.Horizontal(ahead, *sent),
+        panorama,
+        rrb.Horizontal(*texts),
+        *([dialogue_view] if dialogue else []),
+        row_shares=[5, 3, 2, *([3] if dialogue else [])],
+    )
+    body, *others = (TextLogColumn(kind, visible=kind == "Body") for kind in ("Body", "EntityPath", "LogLevel"))
+    events = rrb.TextLogView(
+        origin="/events", name="Events", columns=rrb.archetypes.TextLogColumns(text_log_columns=[body, *others])
+    )
+    below = rrb.Horizontal(*plots, events, column_shares=[*[2] * len(plots), 3])
+    left = rrb.Vertical(world, below, row_shares=[3, 1])
+    return rrb.Blueprint(
+        rrb.Horizontal(left, right, column_shares=[3, 2]),
+        rrb.TimePanel(state="collapsed", timeline="step", fps=1.5, play_state="playing"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+    )
+
+
+def _house_view(house: House) -> rrb.Spatial3DView:
+    """The house in 3D, seen from above its southern side."""
+    corners = np.array([c for r in house.rooms for c in r.polygon])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    centre, span = (low + high) / 2, float(max(high - low))
+    return rrb.Spatial3DView(
+        origin="/",
+        name="House",
+        contents=["+ /house/**", "+ /graph/**", "+ /agent/**", "+ /task/**", "+ /people/**"],
+        eye_controls=rrb.EyeControls3D(
+            position=(centre[0], centre[1] - 0.75 * span, 1.05 * span), look_target=(*centre, 0.0), eye_up=(0, 0, 1)
+        ),
+        background=(245, 246, 248),
+        line_grid=False,
+    )
+
+
+def _plots(probabilities: bool, cost: bool, *, budget: bool) -> list[rrb.View]:
+    """Distance and mode over time, how likely asking was, and what it has cost so far."""
+    plots: list[rrb.View] = [
+        rrb.TimeSeriesView(
+            origin="/plot/distance", name="Metres to go", plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom)
+        ),
+        rrb.StateTimelineView(origin="/mode", name="Mode"),
+    ]
+    if probabilities:
+        plots.append(
+            rrb.TimeSeriesView(
+                origin="/plot/probability",
+                name="Probability of asking",
+                axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
+                plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
+            )
+        )
+    if cost:
+        plots.append(rrb.TimeSeriesView(origin="/plot/cost", name="Cost so far"))
+    if budget:
+        plots.append(rrb.TimeSeriesView(origin="/plot/budget", name="Requests left"))
+    return plots

@@ -43,7 +43,7 @@ from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage
 from embodied.records import Identity, identity_of
 from embodied.seeds import stream
-from embodied.tasks.find import find_pool, find_task
+from embodied.tasks.goals import find_pool, find_task
 
 SINGLE_VIEWS = 0.75
 """Share of the updates, at the start, that train only the heads that read single views (later: DAgger, too)."""

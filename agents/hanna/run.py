@@ -27,7 +27,7 @@ from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.datasets.store import Dataset
 from embodied.interface import Agent, Episode, Task, Teacher
 from embodied.records import identity_of
-from embodied.teachers.hanna import HannaTeacher
+from embodied.teachers.shortest import HannaTeacher
 
 
 class HannaLearner(imitation.ImitationLearner):

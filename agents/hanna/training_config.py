@@ -1,7 +1,7 @@
 """TrainingConfig: the hyperparameters of dissertation Table D.1 and the ablations of D.2, in one record.
 
 Three rows of Table D.1 belong to the world and live there: gamma = 0.25 with the teacher
-(embodied.teachers.hanna), the attention radius with the assistant (embodied.assistants.anna), the
+(embodied.teachers.shortest), the attention radius with the assistant (embodied.assistants.anna), the
 success radius with the task (embodied.kinds.shipped.hanna).
 """
 

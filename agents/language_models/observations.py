@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from embodied.action_spaces import door_actions
-from embodied.assistants.words import side
+from embodied.assistants.descriptions import side
 from embodied.geometry import wrap
 from embodied.gym.sensors import PanoramaStore
 from embodied.house.floor_plan import font

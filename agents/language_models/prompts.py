@@ -22,7 +22,7 @@ from embodied.agents.language_models.observations import (
     pictures_for,
 )
 from embodied.assets.json_file import read_text
-from embodied.assistants.words import side
+from embodied.assistants.descriptions import side
 from embodied.gym.sensors import PanoramaStore
 from embodied.interface import Action, Ask, Intention, Move, Observation, Open, Stop
 

@@ -30,7 +30,7 @@ from embodied.render.camera import Camera
 from embodied.render.classic import Renderer
 from embodied.render.panorama import VFOV36, Panorama, perspective_grid
 from embodied.seeds import stream
-from embodied.tasks.find import find_pool, find_task
+from embodied.tasks.goals import find_pool, find_task
 from embodied.world import World, open_world
 
 FLAT = HouseConfig(area=(70.0, 110.0))

@@ -148,7 +148,7 @@ def find_something(args: DemoOptions, world: World, viewers: tuple[str, ...]) ->
     from embodied.kinds.task_kind import EnvInputs
     from embodied.language import People
     from embodied.policies.baselines import Shortest
-    from embodied.tasks.find import find_pool, find_task
+    from embodied.tasks.goals import find_pool, find_task
 
     task = find_task(find_pool(world, seed=args.seed), args.task, seed=args.seed, language=People())
     make = FIND.environments(EnvInputs({world.name: world}))

@@ -366,7 +366,7 @@ def opened_splits(evaluation: Evaluation) -> Iterable[SplitData]:
 def generated(evaluation: Evaluation) -> SplitData:
     """A flat, or the houses of a list of seeds, which what is written down names by their place in the list alone."""
     from embodied.datasets.store import SplitData
-    from embodied.evaluation.own_agents import read_seeds
+    from embodied.evaluation.evaluate import read_seeds
     from embodied.gym.playground import PlaygroundSettings, flat_playground, houses_playground
 
     args = evaluation.args
@@ -384,7 +384,7 @@ def generated(evaluation: Evaluation) -> SplitData:
 
 def agent_of(evaluation: Evaluation, name: str, split: SplitData, worlds: Mapping[str, SeenPlace] | None) -> Agent:
     """An agent without training; a language model is shown what --sees says."""
-    from embodied.evaluation.own_agents import submitted
+    from embodied.evaluation.evaluate import submitted
 
     if name != LLM:
         kind = evaluation.kind

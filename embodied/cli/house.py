@@ -15,8 +15,8 @@ from embodied.generate.config import SHAPES
 from embodied.generate.plan_file import house_of_plan, load_plan
 from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS
 from embodied.house.validation import STYLES
-from embodied.novelty import NOVELTIES
 from embodied.options import InputPath, OutputFolder, Settings
+from embodied.seeds import NOVELTIES
 
 KIND = "kind of house (what is not given is drawn from the seed)"
 HOUSE_WORDS = {"shape": SHAPES, "style": STYLES, "weather": WEATHERS, "landscape": LANDSCAPES, "season": SEASONS}

@@ -55,7 +55,7 @@ def roll_out(args: RolloutOptions, viewers: tuple[str, ...]) -> None:
     from embodied.language import People
     from embodied.policies.baselines import WITHOUT_LEARNING
     from embodied.render.photograph import PhotoCamera
-    from embodied.tasks.find import find_pool, find_task
+    from embodied.tasks.goals import find_pool, find_task
     from embodied.viz.recording import PictureSizes, record_episode
     from embodied.viz.sinks import Sinks
 

@@ -24,7 +24,7 @@ from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.errors import UnableError
 from embodied.options import Count, Option, OutputFolder, any_path, whole
 from embodied.render.pictures import Baked, PictureSettings, Traced, matte, parse_pictures
-from embodied.serve.address import page_address
+from embodied.serve.study import page_address
 from embodied.software import DISTRIBUTION
 
 if TYPE_CHECKING:

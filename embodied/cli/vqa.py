@@ -30,7 +30,7 @@ def make(args: DatasetOptions) -> None:
     from tqdm import tqdm
 
     from embodied.datasets.vqa.build import VqaConfig, build_vqa
-    from embodied.evaluation.own_agents import read_seeds
+    from embodied.evaluation.evaluate import read_seeds
 
     pictures, seeds = args.pictures or "fast", tuple(read_seeds(args.seed_file)) if args.seed_file else ()
     if pictures == "none" or args.scale:

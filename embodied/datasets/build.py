@@ -31,10 +31,9 @@ from embodied.language import People, PlainLanguage
 from embodied.locks import LOCK, locked
 from embodied.navigation.connectivity import from_matterport, to_matterport
 from embodied.navigation.graph import NavGraph, build_graph
-from embodied.novelty import FAMILIAR, NOVEL
 from embodied.records import load_json, read_json, save_lines
 from embodied.render.pictures import PictureSettings, parse_pictures
-from embodied.seeds import stream
+from embodied.seeds import FAMILIAR, NOVEL, stream
 from embodied.world import World, open_world
 
 W = TypeVar("W")
@@ -78,7 +77,7 @@ class DatasetConfig:
     """Requests name the room; without (VNLA), any thing of the class in the house will do."""
     ood: int = 0
     """Houses out of distribution, split 'test_ood': of models, looks, speakers and words that occur in no other split
-    (embodied.novelty). With any, all other houses are of familiar ones only, so they differ from those without."""
+    (embodied.seeds). With any, all other houses are of familiar ones only, so they differ from those without."""
     own: str = ""
     """Digest of the user's own groups.toml files that the houses are furnished by, too; `build_dataset` fills it in."""
 

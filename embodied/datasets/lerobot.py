@@ -31,7 +31,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from embodied.assets.cache import drafts, sweep, write_bytes, write_json
-from embodied.assistants.words import described
+from embodied.assistants.descriptions import described
 from embodied.datasets.checks import DatasetError
 from embodied.geometry import wrap
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Place, Pose, Step, Stop

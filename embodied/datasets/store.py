@@ -15,8 +15,8 @@ from embodied.house.house import House
 from embodied.interface import Assistant, Episode, Place, Route, Task
 from embodied.kinds.splits import SplitPlan
 from embodied.kinds.task_kind import EnvInputs, EnvMaker, TaskInputs, TaskKind, kind_named
+from embodied.language.people_language import PeoplesWords, Utterance
 from embodied.language.plain_language import PlainLanguage
-from embodied.language.utterances import PeoplesWords, Utterance
 from embodied.navigation.connectivity import from_matterport
 from embodied.navigation.graph import NavGraph, with_edge_doors
 from embodied.records import read_lines

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from embodied.action_spaces import Moves
 from embodied.assistants.ask import in_view
-from embodied.assistants.descriptions import Describer
-from embodied.assistants.words import features_in_words, side
+from embodied.assistants.descriptions import Describer, features_in_words, side
 from embodied.envs.base import HelpEnv
 from embodied.geometry import wrap
 from embodied.interface import (

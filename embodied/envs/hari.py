@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from embodied.action_spaces import Moves
-from embodied.assistants.descriptions import FREQUENT_SHARE, Describer
-from embodied.assistants.words import features_in_words
+from embodied.assistants.descriptions import FREQUENT_SHARE, Describer, features_in_words
 from embodied.envs.base import HelpEnv, required
 from embodied.interface import (
     Action,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from embodied.generate.novelty import styles_of
 from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS, HouseError
 from embodied.house.validation import STYLES
-from embodied.novelty import NOVELTIES
+from embodied.seeds import NOVELTIES
 
 SHAPES = ("rectangle", "L", "T", "U", "cross")
 CHOICES = {

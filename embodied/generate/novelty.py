@@ -9,7 +9,7 @@ from embodied.assets.catalogue import Catalogue
 from embodied.assets.records import Asset
 from embodied.generate.style_finishes import FINISH_TABLE, STYLE_FINISHES, StyleFinishes
 from embodied.house.validation import STYLES
-from embodied.novelty import FAMILIAR, NOVEL, novel_among
+from embodied.seeds import FAMILIAR, NOVEL, novel_among
 
 NOVEL_STYLE = "colourful"
 """The look that is kept from learning: nearly all of its floors, tiles and wallpapers are its own."""

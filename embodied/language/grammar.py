@@ -29,7 +29,7 @@ from embodied.language.clauses import (
 )
 from embodied.language.lexicon import PASSAGES, ROOM_NOUNS, ROOM_OF_NOUN, Lexicon, Word
 from embodied.language.templates import NOVEL_HABIT, SPOKEN, TEMPLATES, Template
-from embodied.novelty import novel_among, of_novelty
+from embodied.seeds import novel_among, of_novelty
 
 if TYPE_CHECKING:
     from embodied.language.templates import Speaker

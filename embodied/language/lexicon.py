@@ -12,7 +12,7 @@ import numpy as np
 
 from embodied.language.clauses import Referent
 from embodied.language.templates import SPOKEN
-from embodied.novelty import novel_among, of_novelty
+from embodied.seeds import novel_among, of_novelty
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from embodied.interface import FindObject, SeenPlace
+from embodied.interface import FindObject, Language, SeenPlace
 from embodied.language.grammar import parse, say
 from embodied.language.lexicon import lexicon_of
 from embodied.language.listener import carry_out
@@ -14,7 +17,7 @@ from embodied.language.plain_language import PlainLanguage
 from embodied.language.route_clauses import plan, shortened
 from embodied.language.surroundings import Lookout
 from embodied.language.templates import draw_speaker
-from embodied.novelty import check_novelty
+from embodied.seeds import check_novelty, stream
 
 GROWTH = (0, 0, 1, 1, 2, 3, 4, 6)
 """Clauses beyond the speaker's own wish, try by try, while an imagined listener gets lost: other words, then more."""
@@ -82,3 +85,34 @@ class RouteDescriber:
         nodes = [n for i, n in enumerate(path) if i == 0 or n != path[i - 1]]
         speaker = draw_speaker(rng)
         return say(shortened(plan(world, nodes, yaw, speaker, rng=rng), speaker.clauses), speaker, rng=rng)
+
+
+@dataclass(frozen=True)
+class Utterance:
+    """Words of somebody and the primitive actions that were meant, without 'stop'."""
+
+    words: tuple[str, ...]
+    text: str
+
+
+class PeoplesWords:
+    """A `Language` with people's sub-goals where people meant the same actions, and another language's elsewhere."""
+
+    def __init__(self, utterances: Iterable[Utterance], other: Language) -> None:
+        self._other = other
+        self._texts: defaultdict[tuple[str, ...], list[str]] = defaultdict(list)
+        for u in utterances:
+            self._texts[u.words].append(u.text)
+
+    def request(self, goal: FindObject, *, rng: np.random.Generator) -> str:
+        return self._other.request(goal, rng=rng)
+
+    def route(self, world: Any, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
+        return self._other.route(world, path, yaw, rng=rng)
+
+    def subgoal(self, words: Sequence[str]) -> str:
+        """Of several people's words for these actions, always the same ones."""
+        texts = self._texts.get(tuple(w for w in words if w != "stop"))
+        if not texts:
+            return self._other.subgoal(words)
+        return texts[int(stream(0, "said", *words).integers(len(texts)))]

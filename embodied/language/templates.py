@@ -18,7 +18,7 @@ import numpy as np
 
 from embodied.assets.json_file import from_plain, read_toml
 from embodied.interface import Intention
-from embodied.novelty import FAMILIAR
+from embodied.seeds import FAMILIAR
 
 
 @dataclass(frozen=True)

@@ -25,14 +25,13 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from embodied.envs.base import ActionError
 from embodied.records import parse, to_json
-from embodied.serve.address import origin_of, page_address
 from embodied.serve.driving import EncodedPanoramas, Live
 from embodied.serve.game import Game
 from embodied.serve.results import summary
 from embodied.serve.screens import houses_of, live_name, next_part, plan_of, screen_of
 from embodied.serve.sessions import Person, Sessions
 from embodied.serve.store import Event, Store
-from embodied.serve.study import LONGEST_TEXT
+from embodied.serve.study import LONGEST_TEXT, origin_of, page_address
 from embodied.serve.talk import spoken_reply
 
 STATIC = Path(__file__).parent / "static"

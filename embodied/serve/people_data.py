@@ -22,8 +22,8 @@ from embodied.datasets.store import SUBGOALS, Dataset
 from embodied.interface import STEP, Episode, Pose, Route, Task
 from embodied.kinds.metrics import sdtw, without_repeats
 from embodied.kinds.shipped.vln import vln_task
+from embodied.language.people_language import Utterance
 from embodied.language.plain_language import PlainLanguage
-from embodied.language.utterances import Utterance
 from embodied.navigation.graph import nearest
 from embodied.records import load_json, load_lines, save_lines
 from embodied.seeds import stream

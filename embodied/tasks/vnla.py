@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from embodied.interface import TURNS, VIEWS, FindObject, Language, Place, Task
-from embodied.tasks.find import Pool, build_pool, draw, task_of_pair
-from embodied.tasks.goals import GoalClass, find_instances, goal_classes
+from embodied.tasks.goals import GoalClass, Pool, build_pool, draw, find_instances, goal_classes, task_of_pair
 from embodied.teachers.vnla import MonocularPlan
 
 FEWEST_NODES = 3

@@ -21,7 +21,7 @@ from embodied.kinds.task_kind import (
 from embodied.navigation.graph import NavGraph, behind_doors
 from embodied.policies.doors import NeverOpens, Wanderer
 from embodied.tasks.doors import with_closed_doors
-from embodied.tasks.find import FindConfig, find_pool, find_task
+from embodied.tasks.goals import FindConfig, find_pool, find_task
 
 SHARE = 0.5
 """Share of the doors that are closed at the start."""

@@ -34,8 +34,7 @@ from embodied.policies.baselines import (
     never_ask,
 )
 from embodied.policies.listeners import ListeningInterpreter
-from embodied.tasks.find import FindConfig, Pool, build_pool, find_task
-from embodied.tasks.goals import find_instances, goal_classes
+from embodied.tasks.goals import FindConfig, Pool, build_pool, find_instances, find_task, goal_classes
 
 TABLE_4_2 = {"train": 51, "val": 7, "test": 10}, five_splits(82_484, 5_001, 5_017, 5_004, 5_012)
 """Houses and splits of the dissertation's Table 4.2."""

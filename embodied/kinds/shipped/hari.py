@@ -32,8 +32,7 @@ from embodied.kinds.task_kind import (
 )
 from embodied.policies.baselines import HalfwaySkyline, RandomWalk, Shortest
 from embodied.seeds import stream
-from embodied.tasks.find import FindConfig, Pool, build_pool, find_task
-from embodied.tasks.goals import GoalClass, find_instances
+from embodied.tasks.goals import FindConfig, GoalClass, Pool, build_pool, find_instances, find_task
 
 HELD_OBJECTS = 0.15
 """Share of object classes that training never asks for, for validation and for test each."""
