@@ -17,10 +17,11 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.middleware.base import BaseHTTPMiddleware, RequestResponseEndpoint
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
-from starlette.routing import Route, WebSocketRoute
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from embodied.envs.base import ActionError
@@ -376,7 +377,7 @@ class Server:
                     await self.advance(person)
 
 
-def app_of(server: Server) -> ASGIApp:
+def app_of(server: Server) -> Starlette:
     """The ASGI application."""
     static = {p.name: (p.read_bytes(), TYPES[p.suffix]) for p in sorted(STATIC.iterdir()) if p.suffix in TYPES}
 
@@ -413,7 +414,15 @@ def app_of(server: Server) -> ASGIApp:
         yield
         ticking.cancel()
 
-    routes = [
+    async def enter(request: Request) -> Response:  # else the page's relative links would miss the path
+        return RedirectResponse(request.url.path + "/")
+
+    async def safe(request: Request, call_next: RequestResponseEndpoint) -> Response:
+        response = await call_next(request)
+        response.headers.update(SAFE)
+        return response
+
+    pages: list[BaseRoute] = [
         Route("/", page),
         Route("/health", health),
         Route("/static/{name}", page),
@@ -421,36 +430,10 @@ def app_of(server: Server) -> ASGIApp:
         Route("/live/{game}/{name}.jpg", live),
         WebSocketRoute("/ws", server.connect),
     ]
-    return with_headers(under_paths(Starlette(routes=routes, lifespan=lifespan), server.paths))
-
-
-def under_paths(app: ASGIApp, paths: Iterable[str]) -> ASGIApp:
-    """Serves the same under each of `paths` as at the root, as a proxy passes requests on that keeps their path."""
-
-    async def wrapped(scope: Scope, receive: Receive, send: Send) -> None:
-        asked = scope.get("path", "")
-        under = next((p for p in paths if asked == p or asked.startswith(p + "/")), "")
-        if under and asked == under and scope["type"] == "http":  # else the page's relative links would miss the path
-            await RedirectResponse(under + "/")(scope, receive, send)
-        else:
-            await app({**scope, "path": asked.removeprefix(under)} if under else scope, receive, send)
-
-    return wrapped
-
-
-def with_headers(app: ASGIApp) -> ASGIApp:
-    """Adds the headers that keep a page to itself."""
-    extra = [(k.encode(), v.encode()) for k, v in SAFE.items()]
-
-    async def wrapped(scope: Scope, receive: Receive, send: Send) -> None:
-        async def send_more(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                message["headers"] = [*message.get("headers", ()), *extra]
-            await send(message)
-
-        await app(scope, receive, send_more)
-
-    return wrapped
+    routes = [*pages]
+    for path in sorted(server.paths):  # a proxy may pass requests on that keep its path
+        routes[:0] = [Route(path, enter), Mount(path, routes=pages)]
+    return Starlette(routes=routes, lifespan=lifespan, middleware=[Middleware(BaseHTTPMiddleware, dispatch=safe)])
 
 
 def read_message(text: str) -> dict[str, Any]:

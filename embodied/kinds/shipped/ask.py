@@ -13,20 +13,8 @@ from embodied.assistants.ask import QUESTIONS, AskAssistant
 from embodied.assistants.descriptions import DESCRIPTION_ROWS, Describer, description_rows
 from embodied.envs.ask import AskEnv, AskSettings
 from embodied.interface import Assistant, Episode, Observation, Place, Stop
+from embodied.kinds import task_kind
 from embodied.kinds.metrics import asked, success
-from embodied.kinds.task_kind import (
-    UNBOUNDED,
-    ArraySpec,
-    EnvInputs,
-    EnvMaker,
-    ExtraArrays,
-    Metric,
-    Parts,
-    PartTasks,
-    TaskInputs,
-    TaskKind,
-    register_kind,
-)
 from embodied.navigation.graph import NavGraph
 from embodied.policies.ask import ASKER_RULES, Asker, CollectThenSplit
 from embodied.policies.baselines import Shortest
@@ -38,7 +26,7 @@ UNSEEN_CLASSES = "unseen_classes"
 QUESTION_LIMITS = range(1, 6)
 
 
-def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
+def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.PartTasks:
     """The same of all parts, but for the classes that are kept from training."""
     look = look_of(getattr(inputs.world, "catalogue", None))
     return {
@@ -51,14 +39,14 @@ def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
     }
 
 
-def environments(inputs: EnvInputs) -> EnvMaker:
+def environments(inputs: task_kind.EnvInputs) -> task_kind.EnvMaker:
     catalogues = (getattr(w, "catalogue", None) for w in inputs.worlds.values())
     return ask_environments(inputs.worlds, look_of(next(catalogues, None)), inputs.rules, inputs.assistant)
 
 
 def ask_environments(
     worlds: Mapping[str, Place], look: Look, rules: AskSettings = AS_USUAL, assistant: Assistant | None = None
-) -> EnvMaker:
+) -> task_kind.EnvMaker:
     """A maker of environments.
 
     Args:
@@ -100,18 +88,18 @@ NO_GOALS = 3
 """Empty rows for goals, which this kind has none of."""
 
 
-def specs(candidates: int, rules: AskSettings) -> dict[str, ArraySpec]:
+def specs(candidates: int, rules: AskSettings) -> dict[str, task_kind.ArraySpec]:
     """'detections' hold sin and cos of bearing, metres and score; 'advised' is the number of an action plus one, 0 for
     none; 'state' has feature sets as rows (assistants.description_arrays); 'goals' is empty."""
     return {
-        "detections": ArraySpec((DETECTIONS, 4), -1.0, UNBOUNDED),
-        "advised": ArraySpec((), 0, candidates + 1, "int64"),
-        "state": ArraySpec((DESCRIPTION_ROWS, 5), 0, UNBOUNDED),
-        "goals": ArraySpec((NO_GOALS, DESCRIPTION_ROWS, 5), 0, UNBOUNDED),
+        "detections": task_kind.ArraySpec((DETECTIONS, 4), -1.0, task_kind.UNBOUNDED),
+        "advised": task_kind.ArraySpec((), 0, candidates + 1, "int64"),
+        "state": task_kind.ArraySpec((DESCRIPTION_ROWS, 5), 0, task_kind.UNBOUNDED),
+        "goals": task_kind.ArraySpec((NO_GOALS, DESCRIPTION_ROWS, 5), 0, task_kind.UNBOUNDED),
     }
 
 
-def encode(o: Observation, specs: Mapping[str, ArraySpec]) -> dict[str, Any]:
+def encode(o: Observation, specs: Mapping[str, task_kind.ArraySpec]) -> dict[str, Any]:
     rows, go = np.zeros(specs["detections"].shape, dtype=np.float32), o.extras.advised
     for i, seen in enumerate(o.extras.detections[:DETECTIONS]):
         rows[i] = np.sin(seen.bearing), np.cos(seen.bearing), seen.distance, seen.score
@@ -124,8 +112,8 @@ def encode(o: Observation, specs: Mapping[str, ArraySpec]) -> dict[str, Any]:
     }
 
 
-ASK = register_kind(
-    TaskKind(
+ASK = task_kind.register_kind(
+    task_kind.TaskKind(
         name="ask",
         title="Ask",
         tasks=tasks,
@@ -138,11 +126,11 @@ ASK = register_kind(
             "oracle": Shortest,
         },
         metrics={
-            "weighted success": Metric(weighted_success, percent=True),
-            "success progress": Metric(success_progress, percent=True),
-            "price": Metric(price),
-            **{f"asks {q.value}": Metric(asked(q)) for q in QUESTIONS},
-            "price per success": Metric(price, per=success),
+            "weighted success": task_kind.Metric(weighted_success, percent=True),
+            "success progress": task_kind.Metric(success_progress, percent=True),
+            "price": task_kind.Metric(price),
+            **{f"asks {q.value}": task_kind.Metric(asked(q)) for q in QUESTIONS},
+            "price per success": task_kind.Metric(price, per=success),
         },
         columns=(
             *("success", "spl", "weighted success", "success progress"),
@@ -151,6 +139,6 @@ ASK = register_kind(
         expert="oracle",
         splits=None,
         intentions=QUESTIONS,
-        extras=ExtraArrays(specs, encode),
+        extras=task_kind.ExtraArrays(specs, encode),
     )
 )

@@ -6,18 +6,8 @@ import functools
 
 from embodied.action_spaces import doors_in
 from embodied.interface import Close, Episode, Task
+from embodied.kinds import task_kind
 from embodied.kinds.metrics import success
-from embodied.kinds.task_kind import (
-    PLAIN_AGENTS,
-    Metric,
-    Parts,
-    PartTasks,
-    StoryStyle,
-    TaskInputs,
-    TaskKind,
-    parts_of_pool,
-    register_kind,
-)
 from embodied.navigation.graph import NavGraph, behind_doors
 from embodied.policies.doors import NeverOpens, Wanderer
 from embodied.tasks.doors import with_closed_doors
@@ -28,14 +18,14 @@ SHARE = 0.5
 CONFIG = FindConfig(kind="doors", horizon=60)
 
 
-def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
+def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.PartTasks:
     pool = find_pool(inputs.world, seed=inputs.seed, config=CONFIG)
 
     def task(i: int) -> Task:
         plain = find_task(pool, i, seed=inputs.seed, language=inputs.language, config=CONFIG)
         return with_closed_doors(plain, inputs.world, SHARE, seed=inputs.seed)
 
-    return parts_of_pool(len(pool), task, parts)
+    return task_kind.parts_of_pool(len(pool), task, parts)
 
 
 def opened(episode: Episode, graph: NavGraph) -> float:
@@ -61,20 +51,24 @@ def success_behind(episode: Episode, graph: NavGraph) -> float:
     return success(episode, graph) * needed(episode, graph)
 
 
-DOORS_KIND = register_kind(
-    TaskKind(
+DOORS_KIND = task_kind.register_kind(
+    task_kind.TaskKind(
         name="doors",
         title="Doors",
         tasks=tasks,
-        baselines={**PLAIN_AGENTS, "never opens": NeverOpens, "wanderer, blind": functools.partial(Wanderer, None)},
+        baselines={
+            **task_kind.PLAIN_AGENTS,
+            "never opens": NeverOpens,
+            "wanderer, blind": functools.partial(Wanderer, None),
+        },
         looking={"wanderer": Wanderer, "wanderer, never opens": functools.partial(Wanderer, opens=False)},
         needs_stop=True,
         metrics={
-            "success behind doors": Metric(success_behind, percent=True, per=needed),
-            "doors opened": Metric(opened),
+            "success behind doors": task_kind.Metric(success_behind, percent=True, per=needed),
+            "doors opened": task_kind.Metric(opened),
         },
         columns=("success", "success behind doors", "spl", "navigation error", "doors opened", "steps"),
         opens_doors=True,
-        story=StoryStyle(dialogue=False),
+        story=task_kind.StoryStyle(dialogue=False),
     )
 )

@@ -10,20 +10,8 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna
 from embodied.envs.base import HelpEnv, required
 from embodied.interface import Ask, Episode, Mode, Move, Place, Reply, Stop, Viewpoint
+from embodied.kinds import task_kind
 from embodied.kinds.splits import five_splits
-from embodied.kinds.task_kind import (
-    PLAIN_AGENTS,
-    EnvInputs,
-    EnvMaker,
-    Metric,
-    Parts,
-    PartTasks,
-    StoryStyle,
-    TaskInputs,
-    TaskKind,
-    parts_of_pool,
-    register_kind,
-)
 from embodied.navigation.graph import NavGraph
 from embodied.policies.baselines import (
     PerfectInterpreter,
@@ -56,9 +44,11 @@ hanna_task = functools.partial(find_task, config=LIMITS)
 """Task `index` of the pool, as find_task."""
 
 
-def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
+def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.PartTasks:
     pool = hanna_pool(inputs.world, seed=inputs.seed)
-    return parts_of_pool(len(pool), lambda i: hanna_task(pool, i, seed=inputs.seed, language=inputs.language), parts)
+    return task_kind.parts_of_pool(
+        len(pool), lambda i: hanna_task(pool, i, seed=inputs.seed, language=inputs.language), parts
+    )
 
 
 class HannaEnv(HelpEnv):
@@ -85,7 +75,7 @@ class HannaEnv(HelpEnv):
         self.time_on_task = 0
 
 
-def environments(inputs: EnvInputs) -> EnvMaker:
+def environments(inputs: task_kind.EnvInputs) -> task_kind.EnvMaker:
     worlds = inputs.worlds
     routes = {name: known for name in worlds if (known := inputs.routes(name))}
     anna = inputs.assistant or Anna({name: w.graph for name, w in worlds.items()}, routes, split=inputs.wording)
@@ -109,15 +99,15 @@ def subtask_success(episode: Episode, graph: NavGraph) -> float:
     return float(np.mean(outcomes)) if outcomes else float("nan")
 
 
-HANNA = register_kind(
-    TaskKind(
+HANNA = task_kind.register_kind(
+    task_kind.TaskKind(
         name="hanna",
         title="HANNA",
         tasks=tasks,
         environment=environments,
         help="words",
         baselines={
-            **PLAIN_AGENTS,  # in the next three the teacher navigates: they show what asking by that rule costs
+            **task_kind.PLAIN_AGENTS,  # in the next three the teacher navigates: they show what asking so costs
             "no ask": lambda: PrivilegedAsking(Shortest(), never_ask),
             "random ask": lambda: PrivilegedAsking(Shortest(), ask_at_random),
             "ask every 5": lambda: PrivilegedAsking(Shortest(), ask_every_5),
@@ -125,11 +115,11 @@ HANNA = register_kind(
         },
         looking={"scripted listener": ListeningInterpreter},
         expert="perfect interpretation",
-        metrics={"subtask success": Metric(subtask_success, percent=True)},
+        metrics={"subtask success": task_kind.Metric(subtask_success, percent=True)},
         columns=("success", "strict success", "spl", "navigation error", "requests"),
         paper=TABLE_4_2,
         routes=True,
         people=True,
-        story=StoryStyle(leaving="leaves the route and goes on by itself"),
+        story=task_kind.StoryStyle(leaving="leaves the route and goes on by itself"),
     )
 )

@@ -14,22 +14,9 @@ from embodied.assistants.descriptions import DESCRIPTION_ROWS, Describer, descri
 from embodied.assistants.hari import HariAssistant, Uncooperative
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
 from embodied.interface import Intention, Observation, Place, Task
+from embodied.kinds import task_kind
 from embodied.kinds.metrics import asked, moves
 from embodied.kinds.splits import SplitPlan, Splits, SplitSizes
-from embodied.kinds.task_kind import (
-    UNBOUNDED,
-    ArraySpec,
-    EnvInputs,
-    EnvMaker,
-    ExtraArrays,
-    Metric,
-    Parts,
-    PartTasks,
-    StoryStyle,
-    TaskInputs,
-    TaskKind,
-    register_kind,
-)
 from embodied.policies.baselines import HalfwaySkyline, RandomWalk, Shortest
 from embodied.seeds import stream
 from embodied.tasks.goals import FindConfig, GoalClass, Pool, build_pool, find_instances, find_task
@@ -61,12 +48,12 @@ hari_task = functools.partial(find_task, config=LIMITS)
 """Task `index` of the pool, as find_task."""
 
 
-def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
+def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.PartTasks:
     """The conditions of 4.3.5: unseen start room, unseen object class, unseen environment."""
     return {part: _part(inputs, part, n) for part, n in parts}
 
 
-def _part(inputs: TaskInputs, part: str, n: int) -> list[Task]:
+def _part(inputs: task_kind.TaskInputs, part: str, n: int) -> list[Task]:
     world, seed = inputs.world, inputs.seed
     pool = hari_pool(world, seed=seed, config=PRETRAINING if part.startswith("pretrain") else LIMITS)
     chosen = itertools.islice((i for i in range(len(pool)) if _belongs(pool, i, part, world, seed)), n)
@@ -142,7 +129,7 @@ seen conditions draw from all 54."""
 # Play -------------------------------------------------------------------------------------------
 
 
-def environments(inputs: EnvInputs) -> EnvMaker:
+def environments(inputs: task_kind.EnvInputs) -> task_kind.EnvMaker:
     rules: HariRules = inputs.rules
     houses = inputs.worlds.values() if inputs.training is None else inputs.training()
     describer = Describer(frequent_classes(houses, rules.kept))
@@ -163,24 +150,24 @@ FEWEST_GOALS = 3
 """Rows for goals, or more where the rules stack more."""
 
 
-def specs(candidates: int, rules: HariRules) -> dict[str, ArraySpec]:
+def specs(candidates: int, rules: HariRules) -> dict[str, task_kind.ArraySpec]:
     """'state' and 'goals': feature sets as rows (assistants.description_arrays), the goals top last."""
     goals = max(FEWEST_GOALS, rules.stack)
     return {
-        "state": ArraySpec((DESCRIPTION_ROWS, 5), 0, UNBOUNDED),
-        "goals": ArraySpec((goals, DESCRIPTION_ROWS, 5), 0, UNBOUNDED),
+        "state": task_kind.ArraySpec((DESCRIPTION_ROWS, 5), 0, task_kind.UNBOUNDED),
+        "goals": task_kind.ArraySpec((goals, DESCRIPTION_ROWS, 5), 0, task_kind.UNBOUNDED),
     }
 
 
-def encode(o: Observation, specs: Mapping[str, ArraySpec]) -> dict[str, np.ndarray]:
+def encode(o: Observation, specs: Mapping[str, task_kind.ArraySpec]) -> dict[str, np.ndarray]:
     goals = np.zeros(specs["goals"].shape, dtype=np.float32)
     for i, description in enumerate(o.extras.goal_descriptions):
         goals[i] = description_rows(description)
     return {"state": description_rows(o.extras.state_description), "goals": goals}
 
 
-HARI = register_kind(
-    TaskKind(
+HARI = task_kind.register_kind(
+    task_kind.TaskKind(
         name="hari",
         title="HARI",
         tasks=tasks,
@@ -192,18 +179,18 @@ HARI = register_kind(
         expert="half-way sub-goals",
         needs_stop=True,  # a task is complete by a_done (4.3.2)
         metrics={
-            "CUR": Metric(asked(Intention.CUR)),
-            "GOAL": Metric(asked(Intention.GOAL)),
-            "SUB": Metric(asked(Intention.SUB)),
-            "DO": Metric(moves),
+            "CUR": task_kind.Metric(asked(Intention.CUR)),
+            "GOAL": task_kind.Metric(asked(Intention.GOAL)),
+            "SUB": task_kind.Metric(asked(Intention.SUB)),
+            "DO": task_kind.Metric(moves),
         },
         columns=("success", "navigation error", "requests", "steps"),
         test_splits=("test_unseen_start", "test_unseen_object", "test_unseen_env"),
         splits=splits,
         paper=TABLE_E_1,
         unseen_part=UNSEEN,
-        extras=ExtraArrays(specs, encode),
+        extras=task_kind.ExtraArrays(specs, encode),
         pictures=False,  # all that its agent perceives are words
-        story=StoryStyle(goal_stack=True),
+        story=task_kind.StoryStyle(goal_stack=True),
     )
 )

@@ -8,19 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from embodied.assistants.advisor import Advisor
 from embodied.envs.vnla import RULES_OF_PLAY, check_rules, fitted
 from embodied.interface import Episode, FindObject, Place, Task
+from embodied.kinds import task_kind
 from embodied.kinds.shipped.hanna import TABLE_4_2
-from embodied.kinds.task_kind import (
-    EnvInputs,
-    EnvMaker,
-    Metric,
-    Parts,
-    PartTasks,
-    TaskInputs,
-    TaskKind,
-    TimeLimits,
-    parts_of_pool,
-    register_kind,
-)
 from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import NavGraph
 from embodied.policies.baselines import RandomWalk, Shortest, SubgoalListener, VnlaAsking
@@ -31,15 +20,15 @@ AS_PUBLISHED = "indirect"
 """Rules as the program plays: help is put into words."""
 
 
-def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
+def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.PartTasks:
     world, seed = inputs.world, inputs.seed
     plan = VnlaTeacher().plan(world)
     pool = vnla_pool(world, plan, seed=seed, by_room=inputs.rooms)
     task = lambda i: vnla_task(pool, i, world, plan, seed=seed, language=inputs.language)
-    return parts_of_pool(len(pool), task, parts)
+    return task_kind.parts_of_pool(len(pool), task, parts)
 
 
-def environments(inputs: EnvInputs) -> EnvMaker:
+def environments(inputs: task_kind.EnvInputs) -> task_kind.EnvMaker:
     check_rules(inputs.rules)
     teacher, rule = VnlaTeacher(), RULES_OF_PLAY[inputs.rules]
     advisor = inputs.assistant or Advisor(teacher, inputs.language or PlainLanguage())
@@ -75,8 +64,8 @@ def room_success(episode: Episode, graph: NavGraph) -> float:
     return float(rooms[episode.nodes[-1]] in {rooms[g] for g in episode.task.goal_nodes})
 
 
-VNLA = register_kind(
-    TaskKind(
+VNLA = task_kind.register_kind(
+    task_kind.TaskKind(
         name="vnla",
         title="VNLA",
         tasks=tasks,
@@ -94,7 +83,7 @@ VNLA = register_kind(
             "listener, teacher": lambda: VnlaAsking(SubgoalListener(), "teacher"),
         },
         expert="shortest, random",
-        metrics={"room success": Metric(room_success, percent=True, share=True)},
+        metrics={"room success": task_kind.Metric(room_success, percent=True, share=True)},
         columns=(
             *("success", "strict success", "oracle success", "room success"),
             *("navigation error", "path length", "requests"),
@@ -102,6 +91,6 @@ VNLA = register_kind(
         monocular=True,
         paper=TABLE_4_2,
         roomless=True,
-        time_limits=TimeLimits(learned_limits, limited),
+        time_limits=task_kind.TimeLimits(learned_limits, limited),
     )
 )
