@@ -11,7 +11,6 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -39,27 +38,6 @@ class ViewPoint(NamedTuple):
     rel_distance: float
 
 
-@dataclass(frozen=True, eq=False)
-class Bearings:
-    """The navigable viewpoints of n poses. (n, D) arrays; of a row the first `count` columns hold."""
-
-    rows: np.ndarray
-    """Rows in Graphs, the nearest to the middle of the view first; the agent's own is left out."""
-    count: np.ndarray
-    """(n,) how many there are."""
-    heading: np.ndarray
-    """Radians from the agent's heading, right is positive."""
-    elevation: np.ndarray
-    """Radians from the agent's elevation."""
-    distance: np.ndarray
-    """Metres, in space."""
-
-    @functools.cached_property
-    def lists(self) -> tuple[list, ...]:
-        """Rows, counts, headings, elevations and distances as lists, which are read one by one ten times as fast."""
-        return tuple(a.tolist() for a in (self.rows, self.count, self.heading, self.elevation, self.distance))
-
-
 class NavigableLocations:
     """Navigable locations as the programs read them. Those of discretized poses are kept, since they recur."""
 
@@ -67,70 +45,31 @@ class NavigableLocations:
         """`half_field`: radians to either side that may be walked to; None is everywhere (unrestricted navigation)."""
         self.graphs, self.half_field = graphs, half_field
         self.view = functools.lru_cache(maxsize=100_000)(self._view)
-        self._around = functools.lru_cache(maxsize=4096)(self._look_around)
-        self.here = functools.lru_cache(maxsize=100_000)(self._here)
-        self._points: list[tuple[float, float, float]] = [(x, y, z) for x, y, z in graphs.positions.tolist()]
-
-    def _here(self, row: int) -> ViewPoint:
-        """The agent's own viewpoint."""
-        graphs = self.graphs
-        x, y, z = self._points[row]
-        return ViewPoint(graphs.ids[row], row - graphs.first[graphs.scans[row]], x, y, z, 0.0, 0.0, 0.0)
 
     def _view(self, code: int) -> tuple[tuple[int, ...], tuple[ViewPoint, ...]]:
-        """Rows and locations that can be walked to from a discretized pose, its own first.
+        """Rows and locations that can be walked to from a discretized pose, the agent's own first.
 
         Args:
           code: row * 36 + viewIndex.
         """
-        row, view = divmod(code, VIEWS)
-        return self.locations(row, self._around(row), view)
-
-    def _look_around(self, row: int) -> Bearings:
-        views = np.arange(VIEWS)
-        return self.bearings(np.full(VIEWS, row), views % HEADINGS * STEP, (views // HEADINGS - 1) * TILT)
-
-    def bearings(self, rows: np.ndarray, heading: np.ndarray, elevation: np.ndarray) -> Bearings:
-        """The navigable viewpoints of n poses.
-
-        Args:
-          rows: (n,) rows of the agents' viewpoints.
-          heading: (n,) radians clockwise from +y.
-          elevation: (n,) radians above the horizon.
-        """
-        graphs = self.graphs
-        neighbours = graphs.neighbours[rows]
-        ahead = np.stack([np.cos(math.pi / 2 - heading), np.sin(math.pi / 2 - heading)], axis=-1).astype(np.float32)
-        x, y = graphs.offset[rows, :, 0], graphs.offset[rows, :, 1]
-        ax, ay = ahead[:, None, 0], ahead[:, None, 1]
+        graphs, (row, view) = self.graphs, divmod(code, VIEWS)
+        heading, elevation = view % HEADINGS * STEP, (view // HEADINGS - 1) * TILT
+        ax, ay = np.float32(np.cos(math.pi / 2 - heading)), np.float32(np.sin(math.pi / 2 - heading))
+        x, y = graphs.offset[row].T
         rel_heading = np.arctan2(x * ay - y * ax, x * ax + y * ay).astype(float)
-        rel_elevation = graphs.slope[rows] - elevation[:, None]
-        keep = neighbours >= 0
+        rel_elevation = graphs.slope[row] - elevation
+        keep = graphs.neighbours[row] >= 0
         if self.half_field is not None:
-            unit = graphs.unit[rows]
+            unit = graphs.unit[row]
             with np.errstate(invalid="ignore"):
-                keep &= (unit[..., 0] * ax + unit[..., 1] * ay).astype(float) >= math.cos(self.half_field)
+                keep &= (unit[:, 0] * ax + unit[:, 1] * ay).astype(float) >= math.cos(self.half_field)
         angle = np.where(keep, np.sqrt(rel_heading**2 + rel_elevation**2), np.inf)
-        order = np.argsort(angle, axis=1, kind="stable")
-
-        def sort(values: np.ndarray) -> np.ndarray:
-            return np.take_along_axis(values, order, axis=1)
-
-        return Bearings(
-            sort(neighbours), keep.sum(1), sort(rel_heading), sort(rel_elevation), sort(graphs.distance[rows])
-        )
-
-    def locations(self, row: int, seen: Bearings, at: int) -> tuple[tuple[int, ...], tuple[ViewPoint, ...]]:
-        """Rows and locations of pose number `at` in `seen`, which is at `row`."""
-        rows, counts, headings, elevations, distances = seen.lists
-        count, ids, points = counts[at], self.graphs.ids, self._points
-        first = self.graphs.first[self.graphs.scans[row]]
-        rows = rows[at][:count]
-        others = []
-        for r, h, e, d in zip(rows, headings[at], elevations[at], distances[at], strict=False):  # these are padded
-            x, y, z = points[r]
-            others.append(ViewPoint(ids[r], r - first, x, y, z, h, e, d))
-        return (row, *rows), (self.here(row), *others)
+        columns = np.argsort(angle, kind="stable")[: keep.sum()]  # the nearest to the middle of the view first
+        rows = (row, *graphs.neighbours[row, columns].tolist())
+        first = graphs.first[graphs.scans[row]]
+        seen = np.column_stack([rel_heading, rel_elevation, graphs.distance[row]])[columns].tolist()
+        places = zip(rows, graphs.positions[[*rows]].tolist(), ([0.0, 0.0, 0.0], *seen), strict=True)
+        return rows, tuple(ViewPoint(graphs.ids[r], r - first, *xyz, *relative) for r, xyz, relative in places)
 
 
 @functools.lru_cache(maxsize=64)
@@ -197,11 +136,19 @@ class DiscreteViews:
         for agent, (code, k, h, e) in enumerate(zip(self._codes, index, heading, elevation, strict=True)):
             row, view = divmod(code, VIEWS)
             if k:
-                row = _chosen(look(code)[0], k, agent, len(self._codes))
+                rows, agents = look(code)[0], len(self._codes)
+                if not 0 <= k < len(rows):
+                    raise ValueError(
+                        f"MatterSim: Invalid action index: {k} in environment {agent} of {agents}; "
+                        f"it has 0 to {len(rows) - 1}"
+                    )
+                row = rows[k]
             if h:
-                view += _turned(view % HEADINGS, steps(h)) - view % HEADINGS
+                at = view % HEADINGS
+                view += heading_step(at * STEP + steps(h) * STEP) - at
             if e:
-                view += HEADINGS * (_tilted(view // HEADINGS - 1, steps(e)) + 1 - view // HEADINGS)
+                tilt = view // HEADINGS - 1
+                view += HEADINGS * (elevation_step(tilt * TILT + steps(e) * TILT) - tilt)
             codes.append(row * VIEWS + view)
         self._codes = codes
 
@@ -223,23 +170,3 @@ class DiscreteViews:
 
     def view(self, agent: int) -> int:
         return self._codes[agent] % VIEWS
-
-
-def _chosen(rows: tuple[int, ...], k: int, agent: int, agents: int) -> int:
-    if not 0 <= k < len(rows):
-        raise ValueError(
-            f"MatterSim: Invalid action index: {k} in environment {agent} of {agents}; it has 0 to {len(rows) - 1}"
-        )
-    return rows[k]
-
-
-def _turned(at: int, steps: float) -> int:
-    if isinstance(steps, int):
-        return (at + steps) % HEADINGS
-    return heading_step(at * STEP + steps * STEP)
-
-
-def _tilted(at: int, steps: float) -> int:
-    if isinstance(steps, int):
-        return max(-1, min(1, at + steps))
-    return elevation_step(at * TILT + steps * TILT)

@@ -16,7 +16,7 @@ import numpy as np
 
 from embodied.mattersim.graphs import Graphs, listed_scans, load_graphs
 from embodied.mattersim.pictures import Skyboxes
-from embodied.mattersim.sight import DiscreteViews, ViewPoint, counted_steps, lookout, sign_steps
+from embodied.mattersim.sight import DiscreteViews, NavigableLocations, ViewPoint, counted_steps, lookout, sign_steps
 from embodied.seeds import stream
 
 Draw = Callable[[str, str, float, float, float, tuple[int, int]], np.ndarray]
@@ -162,7 +162,9 @@ class Simulator:
         self._graphs: Graphs = load_graphs(self._graph_path, listed_scans(self._graph_path))
         self._rng = stream(self._seed, "MatterSim")
         self._skyboxes = Skyboxes(self._dataset_path, self._cache)
-        self._motion = self._new_motion()
+        if not self._discrete:
+            raise ValueError("MatterSim: angles are discretized here; call setDiscretizedViewingAngles(True)")
+        self._motion = DiscreteViews(self._lookout(), self._steps)
         self._states = [SimState(self, self._motion, agent) for agent in range(self._batch)]
         self._scans = [""] * self._batch
         self._ready = True
@@ -186,7 +188,7 @@ class Simulator:
             self.initialize()
         scans, viewpoints = self._each(scanIds, str), self._each(viewpointIds, str)
         rows = [self._graphs.row(s, v) for s, v in zip(scans, viewpoints, strict=True)]
-        self._moving.start(rows, self._each(headings, number), self._each(elevations, number))
+        self._moving.start(rows, self._each(headings, float), self._each(elevations, float))
         self._scans, self._step = scans, 0
         self._drawn = {}
 
@@ -221,8 +223,8 @@ class Simulator:
             raise RuntimeError("MatterSim: newEpisode must be called before makeAction")
         if not self._moving.started:
             raise ValueError("MatterSim: Invalid action index: there are no locations before newEpisode")
-        moves, turns = self._each(index, operator.index), self._each(heading, number)
-        self._moving.act(moves, turns, self._each(elevation, number))
+        moves, turns = self._each(index, operator.index), self._each(heading, float)
+        self._moving.act(moves, turns, self._each(elevation, float))
         self._step += 1
         self._drawn = {}
 
@@ -247,19 +249,13 @@ class Simulator:
             raise IndexError(f"MatterSim: {len(values)} values for {self._batch} agents")
         return [convert(v) for v in values[: self._batch]]
 
-    def _half_field(self) -> float | None:
-        return self._vfov * self._width / self._height / 2 if self._restricted else None
-
-    def _new_motion(self) -> DiscreteViews:
-        look = lookout(self._graphs, self._half_field())
-        if not self._discrete:
-            raise ValueError("MatterSim: angles are discretized here; call setDiscretizedViewingAngles(True)")
-        return DiscreteViews(look, self._steps)
+    def _lookout(self) -> NavigableLocations:
+        return lookout(self._graphs, self._vfov * self._width / self._height / 2 if self._restricted else None)
 
     def _watch(self) -> None:
         """Apply a changed camera from the next action on."""
         if self._motion is not None:
-            self._motion.lookout = lookout(self._graphs, self._half_field())
+            self._motion.lookout = self._lookout()
 
     def _random_viewpoint(self, scan: str) -> str:
         graphs = self._graphs
@@ -290,11 +286,6 @@ class Simulator:
             self._vfov,
             (self._height, self._width),
         )
-
-
-def number(value: Any) -> float:
-    """A number as a float; Python's own stay as they are, for whole steps of 30 degrees are counted faster."""
-    return value if type(value) in (int, float) else float(value)
 
 
 class ForkSimulator(Simulator):
