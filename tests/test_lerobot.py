@@ -20,7 +20,6 @@ from embodied.datasets.lerobot import (
     FPS,
     MOST_CANDIDATES,
     STATE,
-    RecordedCamera,
     export_lerobot,
     seen,
     seen_depth,
@@ -34,7 +33,7 @@ from embodied.render.pictures import Baked
 
 pytestmark = pytest.mark.slow
 
-SMALL = RecordedCamera(32, 48)
+SMALL = (32, 48)
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +54,7 @@ def episodes(data):
 @pytest.fixture(scope="module")
 def folder(data, episodes, tmp_path_factory):
     folder = tmp_path_factory.mktemp("out") / "walks"
-    steps = export_lerobot(data, folder, episodes, succeeded=lambda e: won(data, e), camera=SMALL, depth=True)
+    steps = export_lerobot(data, folder, episodes, succeeded=lambda e: won(data, e), size=SMALL, depth=True)
     assert steps == sum(len(e.steps) for e in episodes)
     return folder
 
@@ -156,7 +155,7 @@ def test_the_command_exports_what_an_expert_or_a_file_of_episodes_did(data, epis
 
 
 def test_what_cannot_be_exported_is_said_and_leaves_nothing(data, episodes, tmp_path):
-    judged = {"succeeded": lambda e: True, "camera": SMALL}
+    judged = {"succeeded": lambda e: True, "size": SMALL}
     with pytest.raises(ValueError, match="no episodes"):
         export_lerobot(data, tmp_path / "none", [], **judged)
     (tmp_path / "full").mkdir()
@@ -167,7 +166,7 @@ def test_what_cannot_be_exported_is_said_and_leaves_nothing(data, episodes, tmp_
     with pytest.raises(DatasetError, match=r"no pictures of 'test_0000'; draw them"):
         export_lerobot(data, tmp_path / "blind", blind, **judged)
     with pytest.raises(ValueError, match="even sides"):
-        RecordedCamera(33, 48)
+        export_lerobot(data, tmp_path / "odd", episodes, **{**judged, "size": (33, 48)})
     assert sorted(p.name for p in tmp_path.iterdir()) == ["full"]
 
 

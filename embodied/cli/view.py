@@ -20,12 +20,8 @@ from embodied.options import InputFolder, Option, OutputRrd, any_path, drawn_as,
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
-    from embodied.assets.catalogue import Catalogue
-    from embodied.datasets.store import Dataset
-    from embodied.interface import Episode
     from embodied.render.pictures import PictureSettings
     from embodied.viz.episode_log import Listed
-    from embodied.viz.sinks import Sinks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,8 +53,13 @@ def run(args: ViewOptions) -> None:
 
 
 def record_one(args: ViewOptions, episodes: Sequence[Listed], number: int) -> None:
-    """Draw one episode of a run again, into a recording."""
+    """Record one episode of a run in its house, drawn again, and with what its agent saw.
+
+    Raises:
+      DatasetError: it was played in a house that is not in the data set.
+    """
     from embodied.datasets.store import Dataset
+    from embodied.viz.recording import record_episode
     from embodied.viz.sinks import Sinks
 
     if not 0 <= number < len(episodes):
@@ -67,52 +68,23 @@ def record_one(args: ViewOptions, episodes: Sequence[Listed], number: int) -> No
         raise ValueError(
             "--episode needs --data DIR, the data set that the run was made on: its houses are drawn again"
         )
-    episode = episodes[number].episode
-    file = args.rrd or args.folder / "recordings" / f"{number}.rrd"
-    viewers = viewers_of(args)
-    video = (args.video, args.video_size) if args.video else None
-    sinks, catalogue, data = Sinks(file, viewers), catalogue_of(args), Dataset(args.data)
-    record_again(args.folder, data, episode, sinks, catalogue, args.cache, pictures=args.pictures, video=video)
-    show(args, {"recording": str(file)}, f"wrote {file}; open it with: rerun {file}")
-
-
-def record_again(
-    run: Path,
-    data: Dataset,
-    episode: Episode,
-    sinks: Sinks,
-    catalogue: Catalogue,
-    cache: Path,
-    *,
-    pictures: str,
-    video: tuple[Path, tuple[int, int]] | None = None,
-) -> None:
-    """Record an episode of a run in its house, drawn again, and with what its agent saw.
-
-    Args:
-      pictures: how the house is drawn.
-      video: a film to write, too, and its height and width in pixels.
-
-    Raises:
-      DatasetError: it was played in a house that is not in the data set.
-    """
-    from embodied.viz.recording import record_episode
-
+    episode, file = episodes[number].episode, args.rrd or args.folder / "recordings" / f"{number}.rrd"
+    sinks, catalogue, data = Sinks(file, viewers_of(args)), catalogue_of(args), Dataset(args.data)
     name = episode.task.world
     data.place_of(episode)
-    seen = looked_at(run, episode.agent, name)
+    seen = looked_at(args.folder, episode.agent, name)
     with contextlib.ExitStack() as stack:
         eyes = None
         if seen is not None:
             from embodied.agents.vision.drawn import drawn_world  # loads torch
 
-            eyes = stack.enter_context(drawn_world(data, name, cache, seen))
-        world = stack.enter_context(data.open_world(name, catalogue, cache, pictures, size=384))
-        watch = lambda steps: bar(steps, "recording", "step")
-        record_episode(world, episode, sinks, eyes=eyes, watch=watch)
-        if video:
-            film(world, episode, *video)
+            eyes = stack.enter_context(drawn_world(data, name, args.cache, seen))
+        world = stack.enter_context(data.open_world(name, catalogue, args.cache, args.pictures, size=384))
+        record_episode(world, episode, sinks, eyes=eyes, watch=lambda steps: bar(steps, "recording", "step"))
+        if args.video:
+            film(world, episode, args.video, args.video_size)
     note(f"recorded {episode.task.id}")
+    show(args, {"recording": str(file)}, f"wrote {file}; open it with: rerun {file}")
 
 
 def looked_at(run: Path, agent: str, house: str) -> PictureSettings | None:

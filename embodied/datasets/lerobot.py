@@ -20,7 +20,6 @@ import contextlib
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,6 +58,8 @@ EVENT = pa.struct(
 """Words at a frame: an assistant's are an 'interjection'."""
 NEAREST, FARTHEST, SHIFT, CODES = 0.01, 10.0, 3.5, 4095
 """Depth videos: metres of the least and the largest code, metres added before the logarithm, the largest code."""
+RECORDED_VFOV = math.radians(60.0)
+"""Vertical field of view, radians."""
 STATE = ("x", "y", "z", "yaw", "pitch")
 """observation.state: the pose before the action; metres in the house's frame, radians."""
 ACTION = ("forward", "left", "up", "turn", "tilt", "ask", "stop")
@@ -98,28 +99,13 @@ chose, -1 for none. By their names LeRobot takes them for neither observations n
 DTYPES = {pa.float32(): "float32", pa.int64(): "int64", pa.bool_(): "bool"}
 
 
-@dataclass(frozen=True)
-class RecordedCamera:
-    """How the agent's view is framed."""
-
-    height: int = 224
-    """Pixels; even, as videos want it."""
-    width: int = 224
-    vfov: float = math.radians(60.0)
-    """Vertical field of view, radians."""
-
-    def __post_init__(self) -> None:
-        if self.height % 2 or self.width % 2 or min(self.height, self.width) < 16:
-            raise ValueError(f"a video needs even sides of at least 16 pixels, got {self.height} x {self.width}")
-
-
 def export_lerobot(
     data: Dataset,
     folder: Path,
     episodes: Iterable[Episode],
     *,
     succeeded: Callable[[Episode], bool],
-    camera: RecordedCamera = RecordedCamera(),
+    size: tuple[int, int] = (224, 224),
     depth: bool = False,
 ) -> int:
     """Write episodes that were played in a data set's houses; returns how many steps they have.
@@ -127,14 +113,15 @@ def export_lerobot(
     Args:
       folder: new or empty; it appears when it is whole.
       succeeded: whether an episode reached its goal (`next.success` of its last step).
+      size: height and width of the pictures, both even.
       depth: also write videos of depth.
 
     Raises:
-      ValueError: the folder is not empty, there is no episode, or one of no step.
+      ValueError: the folder is not empty, there is no episode, one of no step, or a video cannot have this size.
       DatasetError: an episode of another data set's house, or a house without pictures.
     """
     with whole_folder(folder) as draft:
-        writer = Writer(draft, camera, GRAPH_COLUMNS, depth=depth)
+        writer = Writer(draft, size, GRAPH_COLUMNS, depth=depth)
         for episode in episodes:
             place = data.place_of(episode)
             _add(writer, episode, place, _pictures(data, episode.task.world), succeeded)
@@ -219,8 +206,8 @@ def _add(writer: Writer, episode: Episode, place: Place, pictures: Path, succeed
         "candidate": np.array([s.action.candidate if isinstance(s.action, Move) else -1 for s in episode.steps]),
     }
     with PanoramaFile(pictures) as file:
-        frames = [seen(file, s.pose, writer.camera) for s in episode.steps]
-        depths = [seen_depth(file, s.pose, writer.camera) for s in episode.steps] if writer.depth else []
+        frames = [seen(file, s.pose, writer.size) for s in episode.steps]
+        depths = [seen_depth(file, s.pose, writer.size) for s in episode.steps] if writer.depth else []
     words, replies = spoken(episode.steps)
     facts = {"embodied/task": episode.task.id, "embodied/house": episode.task.world, "embodied/agent": episode.agent}
     writer.add(rows, frames, depths, words, replies, succeeded(episode), facts)
@@ -245,18 +232,20 @@ class Writer:
     def __init__(
         self,
         folder: Path,
-        camera: RecordedCamera,
+        size: tuple[int, int],
         columns: Columns = STEP_COLUMNS,
         *,
         key: str = CAMERA,
         fps: int = FPS,
         depth: bool = False,
     ) -> None:
+        if size[0] % 2 or size[1] % 2 or min(size) < 16:
+            raise ValueError(f"a video needs even sides of at least 16 pixels, got {size[0]} x {size[1]}")
         self._folder, self._columns, self._fps = folder, columns, fps
-        self.camera, self.depth = camera, depth
-        self._videos = [_Video(folder, camera, key, fps)]
+        self.size, self.depth = size, depth
+        self._videos = [_Video(folder, size, key, fps)]
         if depth:
-            self._videos.append(_Video(folder, camera, DEPTH, fps, depth=True))
+            self._videos.append(_Video(folder, size, DEPTH, fps, depth=True))
         self._rows: list[dict[str, np.ndarray]] = []
         self._said: list[str] = []
         self._counts: list[Any] = [0 for _ in self._videos]
@@ -332,7 +321,7 @@ class Writer:
         if not self._episodes:
             raise ValueError("there are no episodes to write; give files that hold some")
         rows = {name: np.concatenate([r[name] for r in self._rows]) for name in self._columns}
-        columns = {name: _column(rows[name], kind) for name, (kind, _) in self._columns.items()}
+        columns = {name: pa.array([*rows[name]], kind) for name, (kind, _) in self._columns.items()}
         table = pa.table({**columns, EVENTS: _events(self._said)})
         _save(self._folder / PATHS["data"].format(chunk_index=0, file_index=0), table)
         statistics = {name: _statistics(np.asarray(rows[name], np.float64)) for name in self._columns}
@@ -386,8 +375,8 @@ def _events(replies: Sequence[str]) -> pa.Array:
 class _Video:
     """Owns the video file that is being written; episodes stand in it one after another."""
 
-    def __init__(self, folder: Path, camera: RecordedCamera, key: str, fps: int, *, depth: bool = False) -> None:
-        self._folder, self._camera, self._fps = folder, camera, fps
+    def __init__(self, folder: Path, size: tuple[int, int], key: str, fps: int, *, depth: bool = False) -> None:
+        self._folder, self._size, self._fps = folder, size, fps
         self.key, self.depth = key, depth
         self._number = -1
         self._container: Any = None
@@ -422,9 +411,9 @@ class _Video:
 
     def feature(self) -> dict[str, Any]:
         """The description of the pictures in info.json."""
-        c = self._camera
         codec, pixels, channels = ("hevc", "gray12le", 1) if self.depth else ("h264", "yuv420p", 3)
-        facts: dict[str, Any] = {"height": c.height, "width": c.width, "codec": codec, "pix_fmt": pixels}
+        height, width = self._size
+        facts: dict[str, Any] = {"height": height, "width": width, "codec": codec, "pix_fmt": pixels}
         facts |= {"fps": self._fps, "channels": channels}
         if self.depth:
             facts |= {"depth_min": NEAREST, "depth_max": FARTHEST, "shift": SHIFT, "use_log": True}
@@ -432,7 +421,7 @@ class _Video:
         if self.depth:
             info["depth_unit"] = "mm"
         names = ["height", "width", "channels"]
-        return {"dtype": "video", "shape": [c.height, c.width, channels], "names": names, "info": info}
+        return {"dtype": "video", "shape": [height, width, channels], "names": names, "info": info}
 
     def _path(self) -> Path:
         chunk, file = divmod(self._number, CHUNK)
@@ -448,7 +437,7 @@ class _Video:
         metres = "hevc", "gray12le", {"x265-params": "lossless=1:keyint=2:bframes=0:log-level=error"}
         codec, pixels, options = metres if self.depth else colours
         self._stream = self._container.add_stream(codec, rate=self._fps, options=options)
-        self._stream.width, self._stream.height, self._stream.pix_fmt = self._camera.width, self._camera.height, pixels
+        (self._stream.height, self._stream.width), self._stream.pix_fmt = self._size, pixels
 
 
 def depth_codes(metres: np.ndarray) -> np.ndarray:
@@ -458,23 +447,16 @@ def depth_codes(metres: np.ndarray) -> np.ndarray:
     return np.rint((np.log(clipped + SHIFT) - low) / (high - low) * CODES).astype(np.uint16)
 
 
-def seen(file: PanoramaFile, pose: Pose, camera: RecordedCamera) -> np.ndarray:
+def seen(file: PanoramaFile, pose: Pose, size: tuple[int, int]) -> np.ndarray:
     """(h, w, 3) uint8: what an agent at `pose` has before its eyes."""
     colours_only = Panorama(file.rgb(pose.node), *(np.empty((6, file.size, 0)),) * 2)
-    return colours_only.view_rgb(pose.yaw, pose.pitch, camera.vfov, (camera.height, camera.width))
+    return colours_only.view_rgb(pose.yaw, pose.pitch, RECORDED_VFOV, size)
 
 
-def seen_depth(file: PanoramaFile, pose: Pose, camera: RecordedCamera) -> np.ndarray:
+def seen_depth(file: PanoramaFile, pose: Pose, size: tuple[int, int]) -> np.ndarray:
     """(h, w) float32 metres along the optical axis: the same view's depth."""
-    view = file.read(pose.node).view(pose.yaw, pose.pitch, camera.vfov, (camera.height, camera.width))
+    view = file.read(pose.node).view(pose.yaw, pose.pitch, RECORDED_VFOV, size)
     return np.asarray(view[1], np.float32)
-
-
-def _column(values: np.ndarray, kind: pa.DataType) -> pa.Array:
-    """(n,) or (n, k) values as an Arrow array."""
-    if values.ndim == 1:
-        return pa.array(values, kind)
-    return pa.FixedSizeListArray.from_arrays(pa.array(values.ravel(), kind.value_type), values.shape[1])
 
 
 def _save(path: Path, table: pa.Table) -> None:

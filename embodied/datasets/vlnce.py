@@ -20,7 +20,7 @@ from PIL import Image
 
 from embodied.datasets.folders import write_lines
 from embodied.datasets.habitat import with_experts, write_vlnce
-from embodied.datasets.lerobot import STEP_COLUMNS, Columns, RecordedCamera, Writer, whole_folder
+from embodied.datasets.lerobot import STEP_COLUMNS, Columns, Writer, whole_folder
 from embodied.envs.continuous import (
     POSITION,
     CameraConfig,
@@ -159,12 +159,7 @@ LEROBOT: Columns = {
 
 def _lerobot(folder: Path, walks: Iterable[Taught], camera: CameraConfig, with_depth: bool) -> int:
     writer = Writer(
-        folder,
-        RecordedCamera(camera.height, camera.width, camera.vfov),
-        LEROBOT,
-        key="observation.image",
-        fps=STEPS,
-        depth=with_depth,
+        folder, (camera.height, camera.width), LEROBOT, key="observation.image", fps=STEPS, depth=with_depth
     )
     for t in walks:
         trajectory, n = t.trajectory, len(t.labels)

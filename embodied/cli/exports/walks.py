@@ -129,7 +129,7 @@ class LeRobotOptions(OfData):
 
 
 def run_lerobot(args: LeRobotOptions) -> None:
-    from embodied.datasets.lerobot import RecordedCamera, export_lerobot
+    from embodied.datasets.lerobot import export_lerobot
     from embodied.datasets.store import Dataset
     from embodied.evaluation.evaluate import play
     from embodied.interface import Episode
@@ -157,8 +157,8 @@ def run_lerobot(args: LeRobotOptions) -> None:
         episodes = play(whole_split.make_env, data.task_kind.agent(name), tasks, seed=data.config.seed, agent=name)
 
     succeeded = lambda episode: success(episode, data.place(episode.task.world).graph) > 0
-    watched, camera = bar(episodes, "episodes", "episode"), RecordedCamera(args.size, args.size)
-    steps = export_lerobot(data, args.out, watched, succeeded=succeeded, camera=camera, depth=args.depth)
+    watched, size = bar(episodes, "episodes", "episode"), (args.size, args.size)
+    steps = export_lerobot(data, args.out, watched, succeeded=succeeded, size=size, depth=args.depth)
     text = (
         f"{len(episodes)} episodes, {steps} steps in {args.out}: LeRobotDataset('{args.out.name}', root='{args.out}')"
     )

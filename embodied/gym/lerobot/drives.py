@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from embodied.datasets.lerobot import STEP_COLUMNS, Columns, RecordedCamera, Writer, whole_folder
+from embodied.datasets.lerobot import STEP_COLUMNS, Columns, Writer, whole_folder
 from embodied.gym.driving import expert_action
 from embodied.gym.lerobot import DriveForLeRobot
 from embodied.seeds import stream
@@ -58,10 +58,9 @@ def export_drives(
     if not 0 <= action_noise < 1:
         raise ValueError(f"action_noise is a share from 0 to below 1, got {action_noise}")
     settings, names = env.env.driving.settings, sorted(env.env.driving.worlds)
-    camera = RecordedCamera(settings.height, settings.width, settings.vfov)
     with whole_folder(folder) as draft:
         fps = round(1 / settings.control)
-        writer = Writer(draft, camera, DRIVES, key="observation.image", fps=fps)
+        writer = Writer(draft, (settings.height, settings.width), DRIVES, key="observation.image", fps=fps)
         for k in watch(range(drives)):
             name, rng = names[k * len(names) // drives], stream(seed, "drives", k)
             first, _ = env.reset(seed=int(rng.integers(2**31)), options={"world": name})
