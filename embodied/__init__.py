@@ -16,6 +16,7 @@ Houses
 Pictures
     open_world, open_folder, World a house with its navigation graph, light, cameras and panoramas
     Unlit, Baked, Traced, ViewSettings  how houses are drawn; how an agent's views are framed
+    scene_spec, place              a house as an MjSpec; a robot of any MJCF on its free floor
     NavGraph, Panorama             viewpoints and ways between them; what is seen around one
 Tasks
     make_env                       a Gymnasium environment, as gymnasium.make("embodied/HANNA-v0")
@@ -59,8 +60,9 @@ if TYPE_CHECKING:
     from embodied.render.classic import Renderer
     from embodied.render.panorama import Panorama
     from embodied.render.pictures import Baked, Traced, Unlit
+    from embodied.scene.robots import place
     from embodied.seeds import stream
-    from embodied.world import World, open_folder, open_world
+    from embodied.world import World, open_folder, open_world, scene_spec
 
 __version__: str
 """The version of the installed distribution."""
@@ -85,8 +87,9 @@ _HOMES = {
     "embodied.render.classic": ("Renderer",),
     "embodied.render.panorama": ("Panorama",),
     "embodied.render.pictures": ("Baked", "Traced", "Unlit"),
+    "embodied.scene.robots": ("place",),
     "embodied.seeds": ("stream",),
-    "embodied.world": ("World", "open_folder", "open_world"),
+    "embodied.world": ("World", "open_folder", "open_world", "scene_spec"),
 }
 """The public names of each module."""
 _FOUND = {name: (module, name) for module, names in _HOMES.items() for name in names} | {
@@ -134,7 +137,9 @@ __all__ = [
     "markdown",
     "open_folder",
     "open_world",
+    "place",
     "play",
+    "scene_spec",
     "stream",
 ]
 

@@ -16,9 +16,10 @@ from embodied import gl
 from embodied.assets.cache import default_cache, digest
 from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
+from embodied.assets.moving_parts import openness_of
 from embodied.house.house import HINGED, House
 from embodied.house.lighting import load_lit_house
-from embodied.house.moment import Moment, RigidPose, apart
+from embodied.house.moment import WIDEST, Moment, RigidPose, apart
 from embodied.interface import Sighting
 from embodied.navigation.free_space import closed_doors
 from embodied.navigation.graph import NavGraph, build_graph
@@ -46,6 +47,8 @@ STATES_KEPT = 4
 """Worlds with other doors closed that are held open, each with a renderer once it is drawn."""
 SLACK = 0.05
 """Metres (and three times as many radians) that a body goes until its light is computed anew."""
+SETTLED = 0.01
+"""Metres, and share of an openness, that physics may shift what stands still without its being drawn anew."""
 log = logging.getLogger(__name__)
 
 
@@ -166,10 +169,14 @@ class World:
             raise ValueError(f"body {name!r} needs a name of its own, and lit pictures: unlit ones show no bodies")
         self._bodies[name] = tuple(dataclasses.replace(p, owner=name) for p in parts)
 
-    def follow(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    def follow(self, model: mujoco.MjModel, data: mujoco.MjData, *, slack: float = SLACK) -> None:
         """Show the bodies of a MuJoCo model as they are now: a robot that was attached to the house's own model, or one
         alone. Call it again after the physics; bodies named as placements of the house move these, and doors on hinges
-        the house's doors."""
+        the house's doors, once they are SETTLED away from where they were shown.
+
+        Args:
+          slack: metres, and thrice as many radians, that something may move until its light is computed anew.
+        """
         from embodied.scene.bodies import body_name, body_parts, body_poses  # late: it reads meshes by trimesh
         from embodied.scene.doors import is_of_house, openness
 
@@ -182,10 +189,25 @@ class World:
         free = {model.body(b).name for b in model.jnt_bodyid[model.jnt_type == 0]} & {*self.house.placement_by_id}
         poses = body_poses(model, data, (*self._bodies, *free))
         bodies = {name: pose for name, pose in poses.items() if name in self._bodies}
-        moved = {name: pose for name, pose in poses.items() if name not in self._bodies}
-        opened = {**self.moment.openness, **openness(model, data)}
-        self._moments[-1] = Moment({**self.moment.moved, **moved}, opened, bodies, self.moment.lamps)
-        self._bring_up_to_date(slack=SLACK)
+        before, things, rests = self.moment, self.house.placement_by_id, self._openness_at_rest
+        rest = lambda i: before.moved.get(i) or RigidPose.upright(things[i].position, things[i].yaw)
+        moved = {i: pose for i, pose in poses.items() if i in free and pose.apart(rest(i)) > SETTLED}
+        opened = {
+            i: x
+            for i, x in openness(model, data).items()
+            if abs(x - before.openness.get(i, rests.get(i, 0.0))) > SETTLED
+        }
+        now = Moment({**before.moved, **moved}, {**before.openness, **opened}, bodies, before.lamps)
+        self._moments[-1] = now
+        self._bring_up_to_date(slack=slack)
+
+    @functools.cached_property
+    def _openness_at_rest(self) -> dict[str, float]:
+        """By opening, and by placement id and part, as the house has them."""
+        parts = ((p.id, openness_of(p.params)) for p in self.house.placements)
+        return {o.id: min(o.angle / WIDEST, 1.0) for o in self.house.openings} | {
+            f"{thing}/{part}": x for thing, known in parts for part, x in known.items()
+        }
 
     def show(self, moment: Moment, *, slack: float = 0.0) -> None:
         """Bring the house to a moment, in all that is drawn from now on.
@@ -578,6 +600,31 @@ def open_world(
     """
     graph, cache = graph or build_graph(house), cache or default_cache()
     return World(house, catalogue or load_catalogue(cache), graph, cache, parse_pictures(pictures, size))
+
+
+def scene_spec(
+    house: House | World,
+    pictures: PictureSettings | str | None = "fast",
+    *,
+    catalogue: Catalogue | None = None,
+    cache: Path | None = None,
+) -> mujoco.MjSpec:
+    """A house as an MjSpec to which robots are added (`place`): doors, drawers and lids move, and so does what a hand
+    can take.
+
+    Args:
+      house: or its world, whose pictures these are then.
+      pictures: as of `open_world`; lit first where they are lit. None for what touches alone, which is drawn by
+        `World.follow`.
+    """
+    from embodied.scene import model, robots  # late: compilers of MuJoCo
+
+    world = house if isinstance(house, World) else open_world(house, catalogue, cache, pictures or Unlit())
+    free, bare = model.takeable(world.house, world.catalogue), {} if pictures else {"parts": ()}
+    lit = world.lit if pictures else None
+    spec = model.build_spec(world.house, world.catalogue, free=free, lit=lit, hinged=True, **bare)
+    spec.add_text(name=robots.HOUSE, data=world.house.to_json())
+    return spec
 
 
 def open_folder(

@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from embodied.render.sampling import FACES
+
+if TYPE_CHECKING:
+    import mujoco
 
 NEAR_PLANE, FAR_PLANE = 0.03, 200.0
 """Nothing nearer or farther is drawn, metres."""
@@ -49,6 +53,13 @@ def camera_at(
     """The camera that looks along (yaw, pitch), upright. Radians; yaw ccw from +x, pitch up."""
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
     return Camera(_point(position), (cy * cp, sy * cp, sp), (-cy * sp, -sy * sp, cp), vfov)
+
+
+def camera_of(model: mujoco.MjModel, data: mujoco.MjData, name: str | int) -> Camera:
+    """A camera of a MuJoCo model, where it is now."""
+    camera = model.camera(name).id
+    _, up, back = data.cam_xmat[camera].reshape(3, 3).T
+    return Camera(_point(data.cam_xpos[camera]), _point(-back), _point(up), math.radians(model.cam_fovy[camera]))
 
 
 def face_cameras(position: Sequence[float] | np.ndarray) -> list[Camera]:

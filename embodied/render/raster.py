@@ -151,7 +151,8 @@ class Raster:
         start, count = int(self._starts[0, mesh]), int(self._counts[0, mesh])
         own = self._triangles[start : start + count].astype(np.int64) - first
         self._facing[start : start + count] = _facing(corners["xyz"], own)
-        low, high = vertices.min(0), vertices.max(0)
+        columns = np.ascontiguousarray(vertices.T)
+        low, high = columns.min(1), columns.max(1)
         self.middles[mesh], self.reaches[mesh] = (low + high) / 2, (high - low) / 2
 
     def repaint(self, page: int, at: tuple[int, int], part: np.ndarray) -> None:

@@ -11,12 +11,15 @@ import numpy as np
 import trimesh
 
 from embodied.assets.cache import digest, write_bytes
+from embodied.assets.importing.meshing import crease_normals, decimate, weld
 from embodied.assets.records import Finish, MeshPart
 from embodied.house.moment import RigidPose
 from embodied.scene.part import Part
 
 VISIBLE = (0, 1, 2)
 """Geom groups that MuJoCo's own viewer shows at first."""
+MOST_FACES = 1500
+"""Triangles of a geom as it is drawn; meshes of robots may have a hundred thousand."""
 ROUND = 24
 """Sides of cylinders and capsules."""
 
@@ -72,10 +75,10 @@ def geom_color(model: mujoco.MjModel, geom: int) -> np.ndarray:
 
 
 def _part(model: mujoco.MjModel, geom: int, owner: str, textures: Path) -> Part | None:
-    shape = _shape(model, geom)
+    shape = shape_of(model, geom)
     if shape is None or not len(shape[1]):
         return None
-    vertices, faces, normals, uv = shape
+    vertices, faces, normals, uv = shape if len(shape[1]) <= MOST_FACES else _fewer(*shape)
     flat = np.zeros(9)
     mujoco.mju_quat2Mat(flat, model.geom_quat[geom])
     turn = flat.reshape(3, 3)
@@ -86,7 +89,7 @@ def _part(model: mujoco.MjModel, geom: int, owner: str, textures: Path) -> Part 
     return Part(owner, "object", "", mesh, f"body/{digest(placed.tobytes(), faces.tobytes())[:16]}")
 
 
-def _shape(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+def shape_of(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
     """Vertices, faces, normals and texture coordinates of a geom, in its own frame; None of what has no triangles."""
     kind, size = mujoco.mjtGeom(int(model.geom_type[geom])), model.geom_size[geom]
     kinds = mujoco.mjtGeom
@@ -111,7 +114,7 @@ def _shape(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _mesh(model: mujoco.MjModel, mesh: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """As `_shape`, with a vertex for every corner of a face, as corners have normals and coordinates of their own."""
+    """As `shape_of`, with a vertex for every corner of a face, as corners have normals and coordinates of their own."""
     part = lambda values, first, count: values[first : first + count]
     first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
     vertices = part(model.mesh_vert, model.mesh_vertadr[mesh], model.mesh_vertnum[mesh])
@@ -123,6 +126,14 @@ def _mesh(model: mujoco.MjModel, mesh: int) -> tuple[np.ndarray, np.ndarray, np.
         known = part(model.mesh_texcoord, model.mesh_texcoordadr[mesh], model.mesh_texcoordnum[mesh])
         uv = known[part(model.mesh_facetexcoord, first, count)].reshape(-1, 2) * [1, -1] + [0, 1]
     return corners, np.arange(len(corners)).reshape(-1, 3), normals, uv.astype(np.float32)
+
+
+def _fewer(vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray, uv: np.ndarray) -> tuple[np.ndarray, ...]:
+    """A mesh of a vertex for every corner, of about MOST_FACES triangles."""
+    welded, whole = weld(vertices, faces, 1e-6)
+    points, few, corners_uv = decimate(welded, whole, uv[faces], MOST_FACES)
+    turned = crease_normals(points, few).reshape(-1, 3).astype(np.float32)
+    return points[few].reshape(-1, 3), np.arange(3 * len(few)).reshape(-1, 3), turned, corners_uv.reshape(-1, 2)
 
 
 def _finish(model: mujoco.MjModel, geom: int, textures: Path) -> Finish:

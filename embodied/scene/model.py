@@ -198,7 +198,7 @@ def build_spec(
         parts = house_parts(house, catalogue) if parts is None else parts
         own = lambda p: bodies.get(p.owner) or (hung.get((p.owner, p.yaw)) if doors.is_leaf(p) else None)
         carried = [(p, own(p)) for p in parts if p.owner not in cases]
-        _add_parts(spec, [*carried, *(x for case in cases.values() for x in cupboards.parts_of(case))])
+        _add_parts(spec, [*carried, *(x for case in cases.values() if parts for x in cupboards.parts_of(case))])
     else:
         spec.visual.headlight.active = 0
         spec.add_material(name=PROBE_LIT, emission=1.0, specular=0.0, shininess=0.0)
