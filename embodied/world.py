@@ -616,6 +616,9 @@ def scene_spec(
       house: or its world, whose pictures these are then.
       pictures: as of `open_world`; lit first where they are lit. None for what touches alone, which is drawn by
         `World.follow`.
+
+    Examples:
+      >>> model = embodied.scene_spec(house, pictures=None).compile()
     """
     from embodied.scene import model, robots  # late: compilers of MuJoCo
 

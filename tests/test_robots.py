@@ -61,7 +61,17 @@ def test_a_robot_in_every_awkward_style_stands_works_and_keeps_its_masses(house_
         weight = sum(model.body_mass[b] for b in bodies if not model.body(b).name.endswith("rolling"))
         assert abs(weight - 7) < 1e-6
         told = " ".join(placed.changes)
-        for word in ("floor", "light", "skies", "gravity", "timestep", "integrator", "disableflags", "contype", "start"):
+        for word in (
+            "floor",
+            "light",
+            "skies",
+            "gravity",
+            "timestep",
+            "integrator",
+            "disableflags",
+            "contype",
+            "start",
+        ):
             assert word in told or (word == "timestep" and placed is second), word
     assert model.opt.timestep == 0.001 and model.opt.impratio == 5 and model.opt.gravity[2] == -9.81
     assert model.opt.disableflags == 0 and model.nlight == bare.nlight
@@ -96,7 +106,10 @@ def test_a_jaco_of_dm_control_rides_on_our_wheels(house_spec):
     data.ctrl[[model.actuator(f"robot/{side}").id for side in ("left", "right")]] = 3.0
     before = data.body("robot/chassis").xpos.copy()
     mujoco.mj_step(model, data, nstep=1000)
-    assert 0.1 < np.linalg.norm(data.body("robot/chassis").xpos - before) < 1.0 and data.body("robot/chassis").xmat[8] > 0.9
+    assert (
+        0.1 < np.linalg.norm(data.body("robot/chassis").xpos - before) < 1.0
+        and data.body("robot/chassis").xmat[8] > 0.9
+    )
 
 
 def test_a_robot_without_room_or_name_is_refused(house_spec):

@@ -26,7 +26,7 @@ HOUSE = "embodied_house"
 """Text of a spec that has the JSON of its house."""
 CLEARANCE = 0.002
 """Metres between a robot's lowest point and the floor."""
-AROUND = 2.5
+LOOKED_AROUND = 2.5
 """Metres around a node or a point in which floor is looked for."""
 GRID, TURNS = 0.1, 12
 """Metres between the places that are tried, and directions at each."""
@@ -37,7 +37,7 @@ FINER = {"timestep": min, "impratio": max, "iterations": max, "ls_iterations": m
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class PlacedRobot:
     """A robot in a spec; its names begin with `name` and a slash."""
 
     name: str
@@ -69,8 +69,8 @@ def place(
     rolling: bool = False,
     key: str | None = None,
     name: str = "robot",
-) -> Placed:
-    """Attach a robot to the spec of a house (`scene_spec`); what was changed is in `Placed.changes`.
+) -> PlacedRobot:
+    """Attach a robot to the spec of a house (`scene_spec`); what was changed is in `PlacedRobot.changes`.
 
     Its names get `name` and a slash before them. Floors, lights and skies of its file are left out, masses stay as in
     a model of its own, the finer time step and the more exact solver hold, gravity is the house's, and its geoms meet
@@ -87,10 +87,11 @@ def place(
       ValueError: no such robot, place or keyframe, or no floor that is large enough; the spec is not of a house.
 
     Examples:
+      >>> import mujoco
+      >>> ball = '<mujoco><worldbody><body><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
       >>> spec = embodied.scene_spec(house, pictures=None)
-      >>> placed = embodied.place(spec, mujoco.MjSpec.from_string(MY_ROBOT), at='living_room_1')
+      >>> placed = embodied.place(spec, mujoco.MjSpec.from_string(ball))
       >>> model = spec.compile()
-      >>> placed.put(model, data := mujoco.MjData(model))
     """
     house, child, start = _house_of(spec), _loaded(robot), f"{name}/"
     if any(b.name.startswith(start) for b in spec.bodies):
@@ -125,8 +126,8 @@ def place(
             posed = RigidPose.upright((x, y, z), yaw).then(*_turn_and_shift(qpos[own]))
             qpos[own] = *posed.position, *posed.quat
     if rolling:
-        gone = [alone.jnt_qposadr[j.id] + k for j in free for k in range(7)]
-        qpos = np.delete(qpos, gone)
+        lost = [alone.jnt_qposadr[j.id] + k for j in free for k in range(7)]
+        qpos = np.delete(qpos, lost)
     for element in (*child.keys, *(free if rolling else ())):
         child.delete(element)
     child.add_key(name="start", qpos=qpos, ctrl=data.ctrl)
@@ -144,7 +145,7 @@ def place(
     for joint, (_, gain) in ROLLING.items() if rolling else ():
         actuator = spec.add_actuator(name=start + joint, target=start + joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         actuator.set_to_velocity(kv=gain)
-    return Placed(name, (x, y, z), yaw, tuple(changes))
+    return PlacedRobot(name, (x, y, z), yaw, tuple(changes))
 
 
 def _house_of(spec: mujoco.MjSpec) -> House:
@@ -190,12 +191,12 @@ def _options(spec: mujoco.MjSpec, child: mujoco.MjSpec) -> Iterator[str]:
     child.njmax, child.nconmax, child.nkey = spec.njmax, spec.nconmax, spec.nkey
     child.visual.map.znear, child.visual.map.zfar = spec.visual.map.znear, spec.visual.map.zfar
     for field in (f for f in dir(default) if not f.startswith("_")):
-        mine, its = getattr(ours, field), getattr(theirs, field)
-        if field in FINER and FINER[field](mine, its) != mine:
+        kept, its = getattr(ours, field), getattr(theirs, field)
+        if field in FINER and FINER[field](kept, its) != kept:
             setattr(ours, field, its)
-            yield f"the house's {field} is {its:g} instead of {mine:g}"
-        elif not np.array_equal(mine, its) and not np.array_equal(its, getattr(default, field)):
-            yield f"{field} is {mine} instead of its {its}"
+            yield f"the house's {field} is {its:g} instead of {kept:g}"
+        elif not np.array_equal(kept, its) and not np.array_equal(its, getattr(default, field)):
+            yield f"{field} is {kept} instead of its {its}"
         setattr(theirs, field, getattr(ours, field))
 
 
@@ -280,4 +281,4 @@ def _region(house: House, at: At) -> tuple[int, shapely.Geometry, np.ndarray | N
         (x, y), storey = (float(at[0]), float(at[1])), 0
     else:
         raise ValueError(f"at should be a node, a room, (x, y), (x, y, yaw) or (x, y, z, yaw), got {at!r}")
-    return storey, shapely.Point(x, y).buffer(AROUND), np.array([x, y])
+    return storey, shapely.Point(x, y).buffer(LOOKED_AROUND), np.array([x, y])
