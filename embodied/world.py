@@ -623,9 +623,9 @@ def scene_spec(
     from embodied.scene import model, robots  # late: compilers of MuJoCo
 
     world = house if isinstance(house, World) else open_world(house, catalogue, cache, pictures or Unlit())
-    free, bare = model.takeable(world.house, world.catalogue), {} if pictures else {"parts": ()}
-    lit = world.lit if pictures else None
-    spec = model.build_spec(world.house, world.catalogue, free=free, lit=lit, hinged=True, **bare)
+    free, lit = model.takeable(world.house, world.catalogue), world.lit if pictures else None
+    parts = None if pictures else ()
+    spec = model.build_spec(world.house, world.catalogue, free=free, lit=lit, hinged=True, parts=parts)
     spec.add_text(name=robots.HOUSE, data=world.house.to_json())
     return spec
 
