@@ -1,17 +1,59 @@
-"""Pixels of picture files, those of 16-bit PNG files by a decoder that is quicker than OpenCV's, and gives the same.
+"""Archives of arrays and picture files, read without unpacking more than such files hold.
 
-What it does not read, OpenCV reads: rows filtered otherwise. It checks the sum of the pixels, not those of chunks.
+16-bit PNG files are read by a decoder that is quicker than OpenCV's, and gives the same. What it does not read, OpenCV
+reads: rows filtered otherwise. It checks the sum of the pixels, not those of chunks.
 """
 
 from __future__ import annotations
 
+import contextlib
 import io
 import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
 
 import cv2
 import deflate
 import numpy as np
+from numpy.lib.npyio import NpzFile
 from PIL import Image
+
+MOST_UNPACKED = 4 * 2**30
+"""Most bytes that the arrays of one file unpack to; those of a large house's light are a third of it."""
+MOST_PIXELS = 2**27
+"""Of a picture; the largest here has an eighth of them."""
+
+
+@contextlib.contextmanager
+def open_arrays(file: Path | BinaryIO, most: int = MOST_UNPACKED) -> Iterator[NpzFile]:
+    """An open .npz archive; its arrays are unpacked when they are asked for.
+
+    Raises:
+      ValueError: its directory says that it unpacks to over `most` bytes, or it is no such archive.
+      OSError, or another of embodied.assets.cache.DAMAGED: it cannot be read.
+    """
+    archive = np.load(file, allow_pickle=False)
+    if not isinstance(archive, NpzFile):
+        raise ValueError(f"{file} is no .npz archive")
+    with archive:
+        directory = archive.zip.infolist() if archive.zip else []
+        whole = sum(int(entry.file_size) for entry in directory)  # zipfile unpacks no more than that
+        if whole > most:
+            raise ValueError(f"{file} unpacks to {whole} bytes, such a file should hold at most {most}")
+        yield archive
+
+
+def read_picture(path: Path | str, mode: int = cv2.IMREAD_COLOR) -> np.ndarray | None:
+    """The picture of a file as OpenCV's `imread` gives it; None where it is missing, damaged or declares too much."""
+    try:
+        with Image.open(path) as declared:
+            if declared.width * declared.height > MOST_PIXELS:
+                return None
+        return cv2.imread(str(path), mode)
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError, cv2.error):
+        return None
+
 
 PNG = b"\x89PNG\r\n\x1a\n"
 HEADER = b"IHDR"
@@ -78,3 +120,9 @@ def _filtered_up(data: bytes) -> np.ndarray | None:
     for k in range(1, height):
         np.add(pixels[k - 1], rows[k, 1:], out=pixels[k])
     return pixels.view(np.uint16).byteswap(inplace=True)
+
+
+def jpeg(rgb: np.ndarray, quality: int, *options: int) -> bytes:
+    """(h, w, 3) uint8 sRGB as a JPEG of `quality`, 1 to 100; `options` as cv2.imencode takes them."""
+    bgr = cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2BGR)
+    return cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality, *options])[1].tobytes()

@@ -18,8 +18,8 @@ from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.assets.moving_parts import openness_of
 from embodied.house.house import HINGED, House
-from embodied.house.lighting import load_lit_house
 from embodied.house.moment import WIDEST, Moment, RigidPose, apart
+from embodied.house.validation import load_lit_house
 from embodied.interface import Sighting
 from embodied.navigation.free_space import closed_doors
 from embodied.navigation.graph import NavGraph, build_graph

@@ -11,14 +11,12 @@ import numpy as np
 import pytest
 from handmade_models import CUBE, write_own, write_pack
 
-from embodied.assets.attribution import attribution
 from embodied.assets.built import BUILT_ASSETS
-from embodied.assets.catalogue import load_catalogue
+from embodied.assets.catalogue import attribution, load_catalogue
 from embodied.assets.importing import packs
 from embodied.assets.importing.importer import finish_parts, read_obj
 from embodied.assets.importing.obj import MeshError, parse_obj
-from embodied.assets.importing.packs import find_packs
-from embodied.assets.importing.sh3f import CATALOGUE, MAX_ENTRY, PackError, open_pack
+from embodied.assets.importing.sh3f import CATALOGUE, MAX_ENTRY, PackError, find_packs, open_pack
 from embodied.assets.json_file import RecordError
 from embodied.assets.records import ROOM_KINDS, SUPPORTS, ImportRecipe, bounds
 from embodied.assets.rows import DATA

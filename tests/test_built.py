@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import shapely
 
-from embodied.assets.built import BUILT_ASSETS, soft, storage, tableware
+from embodied.assets.built import BUILDS, BUILT_ASSETS, read_built_assets, remade, soft, storage, tableware
 from embodied.assets.built.primitives import (
     ball,
     bar,
@@ -27,10 +27,8 @@ from embodied.assets.built.primitives import (
     sheet,
     tube,
 )
-from embodied.assets.built.table import BUILDS, read_built_assets, remade
 from embodied.assets.json_file import RecordError
-from embodied.assets.materials import MATERIALS
-from embodied.assets.materials.registry import read_materials
+from embodied.assets.materials import MATERIALS, read_materials
 from embodied.assets.records import Finish
 from embodied.assets.rows import read_models
 

@@ -45,8 +45,8 @@ from embodied.agents.iliad.regex.run import load_student
 from embodied.agents.vision.config import PLAIN
 from embodied.agents.vision.features import load_features, save_features
 from embodied.agents.vision.labels import HouseStrips
-from embodied.assets.archives import open_arrays, read_picture
 from embodied.assets.closure import ROOT
+from embodied.assets.decoding import open_arrays, read_picture
 from embodied.assets.importing.own import import_own, read_own
 from embodied.assets.json_file import RecordError, read_json, read_toml
 from embodied.assets.rows import DATA
@@ -480,7 +480,7 @@ def test_no_picture_is_decoded_that_declares_another_size_or_to_be_huge(kind, tm
 
 def test_pictures_are_read_through_what_knows_their_size():
     files = (p for top in ("assets", "embodied", "agents", "viz") for p in (ROOT / top).rglob("*.py"))
-    assert [p.name for p in files if "cv2.imread(" in p.read_text(encoding="utf-8")] == ["archives.py"]
+    assert [p.name for p in files if "cv2.imread(" in p.read_text(encoding="utf-8")] == ["decoding.py"]
 
 
 # Texts ---------------------------------------------------------------------------------------------

@@ -215,6 +215,6 @@ def test_doctor_knows_the_renderer_and_the_furniture(shared_cache, capsys):
 
 
 def test_doctor_tells_the_remedy_when_the_furniture_is_missing(shared_cache, monkeypatch, capsys):
-    monkeypatch.setattr("embodied.assets.importing.packs._installed", tuple)
+    monkeypatch.setattr("embodied.assets.importing.sh3f._installed", tuple)
     main(["doctor", "--cache", str(shared_cache)])
     assert "no furniture library found" in (said := capsys.readouterr().out) and "doctor --fix" in said

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from embodied.assets.json_file import RecordError
-from embodied.assets.materials import MATERIALS, fingerprint, finish, make_maps
-from embodied.assets.materials.registry import PAINTERS, painters_of, read_materials
+from embodied.assets.materials import MATERIALS, PAINTERS, fingerprint, finish, make_maps, painters_of, read_materials
 
 PICTURES = ("art", "rug", "label")
 """Families that are shown once, not repeated."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 
-import embodied.assets.importing.packs as packs
+import embodied.assets.importing.sh3f as packs
 from embodied.assets.built import BASICS
 from embodied.assets.catalogue import _tell_once, load_catalogue
 from embodied.generate import HouseConfig, generate_house

@@ -11,7 +11,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, box_mesh, furnished
 
 from embodied.assets.catalogue import load_catalogue
-from embodied.assets.importing.packs import find_packs
+from embodied.assets.importing.sh3f import find_packs
 from embodied.assets.records import Asset, Finish, SupportSurface
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import Placement

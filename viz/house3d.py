@@ -12,7 +12,7 @@ import numpy as np
 import rerun as rr
 from scipy.spatial import cKDTree
 
-from embodied.assets.archives import read_picture
+from embodied.assets.decoding import read_picture
 from embodied.assets.records import Finish, MeshPart
 from embodied.geometry import rotation
 from embodied.scene.house_meshes import Part

@@ -20,13 +20,13 @@ import rerun as rr
 from scipy.spatial.transform import Rotation
 
 from embodied.action_spaces import doors_moved
+from embodied.assets.decoding import jpeg
 from embodied.interface import Ask, Close, Episode, Mode, Move, Open, Pose, Step, Stop, Task
 from embodied.kinds.task_kind import kind_named
 from embodied.language.plain_language import detokenized
 from embodied.navigation.doors import place_named, seen_name
 from embodied.navigation.free_space import EYE
 from embodied.render.camera import camera_at
-from embodied.render.jpeg import jpeg
 from embodied.render.panorama import Panorama, Recognised
 from embodied.render.photograph import PhotoCamera
 from embodied.viz.episode_log import EpisodeLog, question_of

@@ -12,8 +12,8 @@ import numpy as np
 
 from embodied.agents.vision.features import EQUIRECT, margin, strip_of
 from embodied.agents.vision.strip import CELL, HEIGHT, STRIP_COLUMNS, STRIP_ROWS, WIDTH, windows
-from embodied.assets.archives import open_arrays
 from embodied.assets.cache import DAMAGED, atomic_path
+from embodied.assets.decoding import open_arrays
 from embodied.assets.records import ROOM_KINDS
 from embodied.house.house import OPENING_KINDS, House
 from embodied.scene.house_meshes import owners

@@ -22,9 +22,9 @@ from PIL import Image, UnidentifiedImageError
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from embodied.assets.archives import open_arrays
 from embodied.assets.cache import atomic_path, digest, write_bytes, write_json
 from embodied.assets.closure import code_digest
+from embodied.assets.decoding import open_arrays
 from embodied.assets.importing.covers import COVERS, FOLDED, cover_of, creased, kind_of, laid_on, picture
 from embodied.assets.importing.meshing import CREASE, crease_normals, decimate, face_normals, indexed, sound_faces, weld
 from embodied.assets.importing.mtl_finish import corrected, finish_of

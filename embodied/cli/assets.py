@@ -59,7 +59,7 @@ def list_assets(args: AssetsOptions, catalogue: Catalogue, chosen: Sequence[Asse
 
 def attribution(args: AssetsOptions, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
     """Write who made which model, under which licence."""
-    from embodied.assets.attribution import write_attribution
+    from embodied.assets.catalogue import write_attribution
 
     write_attribution(catalogue, args.out)
     show(args, {"out": str(args.out)}, f"wrote {args.out}")

@@ -91,7 +91,7 @@ def line(f: Finding) -> str:
 def fix(libraries: tuple[Path, ...] = ()) -> Iterator[str]:
     """Install these furniture libraries, and what this machine lacks and can have without root; yields what is done."""
     from embodied import gl
-    from embodied.assets.importing.packs import OWN_FOLDER, find_packs, install_packs
+    from embodied.assets.importing.sh3f import OWN_FOLDER, find_packs, install_packs
     from embodied.light.backend import find_llvm
 
     for path in install_packs(libraries):
@@ -167,7 +167,7 @@ def renderer(_: DoctorOptions) -> Finding:
 
 def packs(args: DoctorOptions) -> Finding:
     """The furniture libraries, and whether they hold every model of the catalogue."""
-    from embodied.assets.importing.packs import find_packs
+    from embodied.assets.importing.sh3f import find_packs
 
     remedy = (
         "embodied doctor --fix, or in a clone make wheels and pip install dist/embodied_houses_furniture-*.whl, or "

@@ -61,7 +61,7 @@ class LightOptions(Furnished, Printed):
 
 
 def run(args: LightOptions) -> None:
-    from embodied.house.lighting import load_lit_house, save_lightings
+    from embodied.house.validation import load_lit_house, save_lightings
     from embodied.light import bake_all, lightings_of, progress_bar
     from embodied.light.backend import device
     from embodied.locks import locked

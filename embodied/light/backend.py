@@ -1,4 +1,4 @@
-"""Finds and starts Mitsuba, and holds the few array helpers that all of `embodied.light` shares.
+"""Finds and starts Mitsuba, and holds the few helpers that all of `embodied.light` shares.
 
 Mitsuba's variants compile kernels: `cuda_ad_rgb` where a GPU is, else `llvm_ad_rgb`, which
 needs a shared libLLVM of version 15 or later (`embodied doctor --fix`, or Debian: `apt install libllvm19`).
@@ -14,16 +14,26 @@ import os
 import re
 import types
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from embodied.errors import UnableError
-from embodied.light.arrays import Array, Ray, RayScene
 from embodied.software import bundled, load_atomic, threads_allowed
+
+# What Mitsuba and Dr.Jit compute with has no static types: names for what signatures hold.
+Array: TypeAlias = Any
+"""Numbers of n rays or points, or (c, n) vectors; a Python number or True fits all of them."""
+Ray: TypeAlias = Any
+"""n rays: origins and directions (3, n)."""
+RayScene: TypeAlias = Any
+"""Triangles that rays can be put to."""
+Triple: TypeAlias = Sequence[float] | np.ndarray
+"""(3,) numbers: a place in metres or a direction, world."""
+
 
 _LLVM_PLACES = (
     "/usr/lib/*/libLLVM*.so*",
@@ -278,3 +288,18 @@ def accumulate(count: int, one: Callable[[Array], tuple[Array, ...]], *zeros: Ar
 def warn(message: str) -> None:
     """Tell the user about a fall-back."""
     warnings.warn(message, RuntimeWarning, stacklevel=3)
+
+
+T = TypeVar("T")
+LightingCache: TypeAlias = dict[Hashable, Any]
+"""Results by name; owned by those who light a house several times."""
+
+
+def get_or_compute(memory: LightingCache | None, key: Hashable, make: Callable[[], T]) -> T:
+    """Result of `make` when `key` was first asked for; without a cache it is made each time."""
+    if memory is None:
+        return make()
+    if key not in memory:
+        memory[key] = make()
+    known: T = memory[key]
+    return known

@@ -14,9 +14,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from embodied.assets.archives import MOST_PIXELS
 from embodied.assets.cache import write_bytes
-from embodied.assets.decoding import colours, numbers, size_of
+from embodied.assets.decoding import MOST_PIXELS, colours, numbers, size_of
 from embodied.geometry import yaw_of_heading
 from embodied.render.panorama import (
     Panorama,

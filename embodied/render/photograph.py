@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from embodied.render.jpeg import jpeg
+from embodied.assets.decoding import jpeg
 from embodied.seeds import stream
 
 CAMERAS = ("ideal", "phone", "robot")

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from embodied.assets.archives import open_arrays
 from embodied.assets.cache import DAMAGED, atomic_path
+from embodied.assets.decoding import open_arrays
 from embodied.house.house import House
 from embodied.interface import Sighting
 from embodied.render.panorama import face_rays, ray_stretch

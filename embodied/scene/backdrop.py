@@ -11,9 +11,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from embodied.assets.archives import read_picture
 from embodied.assets.cache import digest, write_bytes
 from embodied.assets.closure import code_digest
+from embodied.assets.decoding import read_picture
 from embodied.house.house import House
 from embodied.scene.far_canvas import KNOTS, DrawList, FarCanvas, FarLight, elevations, share_down
 from embodied.scene.far_land import DRY, paint_ground, paint_water, ridge

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from embodied import gl
-from embodied.assets.archives import read_picture
+from embodied.assets.decoding import read_picture
 
 gl.prepare()
 

@@ -19,11 +19,11 @@ from concurrent.futures import ThreadPoolExecutor
 import cv2
 import numpy as np
 
+from embodied.assets.decoding import jpeg
 from embodied.envs.continuous import Body, NavMeshCache
 from embodied.errors import UnableError
 from embodied.interface import Place, Pose
 from embodied.render.camera import camera_at
-from embodied.render.jpeg import jpeg
 from embodied.render.panorama_file import PanoramaFile, beside
 from embodied.world import World
 

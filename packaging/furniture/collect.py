@@ -11,11 +11,9 @@ import sys
 import zipfile
 from pathlib import Path
 
-from embodied.assets.attribution import write_attribution
-from embodied.assets.catalogue import load_catalogue
+from embodied.assets.catalogue import load_catalogue, write_attribution
 from embodied.assets.importing.importer import obj_files
-from embodied.assets.importing.packs import SYSTEM_FOLDER, find_packs
-from embodied.assets.importing.sh3f import CATALOGUE, Pack, open_pack
+from embodied.assets.importing.sh3f import CATALOGUE, SYSTEM_FOLDER, Pack, find_packs, open_pack
 
 HERE = Path(__file__).resolve().parent
 STAMP = (2020, 12, 22, 0, 0, 0)

@@ -97,7 +97,7 @@ def run_usd(args: UsdOptions) -> None:
 
 def lit_house(args: HouseOptions) -> tuple[House, Catalogue, LitPages | None]:
     """The house, its furniture and its baked light, from the cache where it is there; None for no light."""
-    from embodied.house.lighting import load_lit_house
+    from embodied.house.validation import load_lit_house
 
     catalogue = catalogue_of(args)
     house = load_lit_house(args.house, catalogue)

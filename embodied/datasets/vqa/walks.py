@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 import shapely
 
-from embodied.assets.archives import read_picture
 from embodied.assets.cache import write_bytes
+from embodied.assets.decoding import read_picture
 from embodied.geometry import rectangle, wrap
 from embodied.house.house import House, Placement
 from embodied.navigation.graph import NavGraph

@@ -12,14 +12,17 @@ import numpy as np
 import shapely
 
 from embodied.house.house import House
-from embodied.light.arrays import Array, RayScene
 from embodied.light.backend import (
+    Array,
+    LightingCache,
+    RayScene,
     accumulate,
     array,
     booleans,
     brightness,
     dr,
     floats,
+    get_or_compute,
     mi,
     opaque_float,
     opaque_uint,
@@ -27,7 +30,6 @@ from embodied.light.backend import (
     vector,
 )
 from embodied.light.baking.solve import Radiosity
-from embodied.light.lighting_cache import LightingCache, get_or_compute
 from embodied.light.pages.atlas import Atlas, Page
 from embodied.light.pages.colours import ColourMaps, colour_at, linear, paints_of, shown
 from embodied.light.pages.cover import Cover, Texels, cover, sources, surface

@@ -10,8 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from embodied.light.arrays import Array
-from embodied.light.backend import array, brightness, dr, floats, mi, opaque_float, signed, vector
+from embodied.light.backend import Array, array, brightness, dr, floats, mi, opaque_float, signed, vector
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.cover import Texels
 

@@ -22,14 +22,14 @@ from tqdm import tqdm
 
 from embodied.assets.cache import digest, write_bytes, write_json
 from embodied.assets.catalogue import Catalogue
+from embodied.assets.decoding import jpeg
 from embodied.house.house import WEATHERS, House, Sky
-from embodied.light.backend import device, free_memory, warn
+from embodied.light.backend import LightingCache, device, free_memory, get_or_compute, warn
 from embodied.light.baking.compose import Composer, LightSolution, page_of
 from embodied.light.baking.probes import probes_of
 from embodied.light.baking.solve import BakeInput, Radiosity, solve
 from embodied.light.baking.stages import facts_of, kept_light, mark_of, same_atlas
 from embodied.light.baking.surroundings import Outside, daylit, dome_mesh, outside_of
-from embodied.light.lighting_cache import LightingCache, get_or_compute
 from embodied.light.pages import tone
 from embodied.light.pages.atlas import Atlas, atlas_of, coarsened, things_of
 from embodied.light.pages.colours import ColourMaps
@@ -52,7 +52,6 @@ from embodied.light.tracing.luxels import Luxels, luxels_of, with_glow
 from embodied.light.tracing.radiosity import scenes_without, space_of, with_env
 from embodied.light.tracing.sky import outdoors as outdoors_of
 from embodied.locks import locked
-from embodied.render.jpeg import jpeg
 from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part

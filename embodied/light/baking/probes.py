@@ -11,11 +11,9 @@ import shapely
 
 from embodied.geometry import r2
 from embodied.house.house import House
-from embodied.light.arrays import RayScene
-from embodied.light.backend import floats, mi, vector
+from embodied.light.backend import LightingCache, RayScene, floats, get_or_compute, mi, vector
 from embodied.light.baking.compose import LightSolution
 from embodied.light.baking.solve import BakeInput, clamp_fireflies, leaving, sunlit
-from embodied.light.lighting_cache import LightingCache, get_or_compute
 from embodied.light.probes import ORDERS, Probes
 from embodied.light.settings import LightSettings
 from embodied.light.tracing import air, radiosity

@@ -10,10 +10,8 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.house.shapes import inward
-from embodied.light.arrays import RayScene
-from embodied.light.backend import array, brightness, floats, mi
+from embodied.light.backend import LightingCache, RayScene, array, brightness, floats, get_or_compute, mi
 from embodied.light.baking import denoise
-from embodied.light.lighting_cache import LightingCache, get_or_compute
 from embodied.light.pages.atlas import Atlas
 from embodied.light.settings import LightSettings
 from embodied.light.tracing import radiosity

@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from embodied.house.house import House
-from embodied.light.arrays import RayScene
-from embodied.light.backend import dr, floats, mi, opaque_float, scene_of, vector
+from embodied.light.backend import RayScene, dr, floats, mi, opaque_float, scene_of, vector
 from embodied.light.baking.compose import spread
 from embodied.light.pages.atlas import Atlas, atlas_of, things_of
 from embodied.light.pages.colours import ColourMaps, albedo

@@ -11,11 +11,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from embodied.assets.archives import read_picture
 from embodied.assets.cache import atomic_path, digest
 from embodied.assets.closure import code_digest
-from embodied.light.arrays import Array
-from embodied.light.backend import array, bilinear, dr, floats, mi, unsigned
+from embodied.assets.decoding import read_picture
+from embodied.light.backend import Array, array, bilinear, dr, floats, mi, unsigned
 from embodied.light.pages.atlas import Page, flat_areas
 from embodied.light.pages.cover import Cover
 

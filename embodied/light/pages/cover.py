@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from embodied.light.arrays import Array, RayScene
-from embodied.light.backend import dr, floats, looped, mi, opaque_float, opaque_uint, scene_of
+from embodied.light.backend import Array, RayScene, dr, floats, looped, mi, opaque_float, opaque_uint, scene_of
 from embodied.light.pages.atlas import Page
 from embodied.light.pages.unwrap import face_normals
 

@@ -16,17 +16,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from embodied.assets.archives import open_arrays, read_picture
 from embodied.assets.cache import write_files
+from embodied.assets.decoding import jpeg, open_arrays, read_picture
 from embodied.assets.json_file import read_json
 from embodied.house.house import House
-from embodied.light.backend import LightError, warn
-from embodied.light.lighting_cache import LightingCache, get_or_compute
+from embodied.light.backend import LightError, LightingCache, get_or_compute, warn
 from embodied.light.pages.records import load_record, packed
 from embodied.light.pages.tone import Exposure
 from embodied.light.probes import Probes
 from embodied.light.settings import light_code
-from embodied.render.jpeg import jpeg
 from embodied.scene.lit_pages import LitMesh, LitPages
 
 PROBES = "probes.npz"

@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from embodied.assets.archives import open_arrays
 from embodied.assets.cache import DAMAGED, write_bytes
+from embodied.assets.decoding import open_arrays
 
 T = TypeVar("T")
 LEVEL = 1

@@ -15,8 +15,7 @@ import shapely
 from scipy.ndimage import map_coordinates
 
 from embodied.house.house import House
-from embodied.light.arrays import Array
-from embodied.light.backend import array, dr, mi, vector
+from embodied.light.backend import Array, array, dr, mi, vector
 from embodied.light.pages.colours import shown
 
 TARGET = 1.05

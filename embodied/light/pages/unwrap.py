@@ -22,8 +22,7 @@ from embodied.assets.cache import digest
 from embodied.assets.closure import code_digest
 from embodied.assets.records import MeshPart
 from embodied.geometry import r2
-from embodied.light.arrays import Array
-from embodied.light.backend import accumulate, dr, floats, fraction, mi, scene_of, vector
+from embodied.light.backend import Array, accumulate, dr, floats, fraction, mi, scene_of, vector
 from embodied.light.pages.records import load_record, save_record
 
 ONCE = 6000.0

@@ -9,8 +9,18 @@ from collections.abc import Callable
 
 import numpy as np
 
-from embodied.light.arrays import Array, RayScene
-from embodied.light.backend import accumulate, array, booleans, dr, floats, mi, opaque_float, opaque_uint
+from embodied.light.backend import (
+    Array,
+    RayScene,
+    accumulate,
+    array,
+    booleans,
+    dr,
+    floats,
+    mi,
+    opaque_float,
+    opaque_uint,
+)
 from embodied.light.probes import lobed, terms
 from embodied.light.tracing.emitters import GLAZING, Lamp, Portal
 from embodied.light.tracing.radiosity import LIFT, NOTHING, Met, Patches, Points, Space, env_lookup, hit_luxel

@@ -11,8 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from embodied.light.arrays import Array, Ray, RayScene
 from embodied.light.backend import (
+    Array,
+    Ray,
+    RayScene,
     accumulate,
     array,
     booleans,

@@ -15,8 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from embodied.geometry import r2
-from embodied.light.arrays import Array, Ray, RayScene
 from embodied.light.backend import (
+    Array,
+    LightingCache,
+    Ray,
+    RayScene,
     accumulate,
     array,
     bilinear,
@@ -31,7 +34,6 @@ from embodied.light.backend import (
     unsigned,
     vector,
 )
-from embodied.light.lighting_cache import LightingCache
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.cover import Texels, sources
 from embodied.light.pages.unwrap import face_normals

@@ -12,8 +12,7 @@ import cv2
 import numpy as np
 
 from embodied.house.house import House
-from embodied.light.arrays import Array, Ray, Triple
-from embodied.light.backend import array, dr, floats, mi, opaque_float, vector
+from embodied.light.backend import Array, Ray, Triple, array, dr, floats, mi, opaque_float, vector
 from embodied.light.pages.files import Bake
 from embodied.light.pages.tone import develop
 from embodied.light.tracing import paths, radiosity

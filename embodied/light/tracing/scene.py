@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 
 from embodied.house.house import House
-from embodied.light.arrays import Array, Ray, RayScene
-from embodied.light.backend import bilinear, booleans, dr, floats, mi, scene_of, unsigned
+from embodied.light.backend import Array, Ray, RayScene, bilinear, booleans, dr, floats, mi, scene_of, unsigned
 from embodied.light.pages.colours import linear
 from embodied.light.pages.files import Bake
 from embodied.light.pages.unwrap import distinct, face_normals
