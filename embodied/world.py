@@ -16,7 +16,11 @@ from embodied import gl
 from embodied.assets.cache import default_cache, digest
 from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
+<<<<<<< HEAD
 from embodied.assets.moving_parts import openness_of
+=======
+from embodied.assets.decoding import load_record, save_record
+>>>>>>> c11f6549 (Cameras, qualities of light and reviewers' words for looks are tables; sightings and bakes are written by one function)
 from embodied.house.house import HINGED, House
 from embodied.house.moment import WIDEST, Moment, RigidPose, apart
 from embodied.house.validation import load_lit_house
@@ -29,7 +33,7 @@ from embodied.render.classic import Renderer
 from embodied.render.panorama import VFOV36, Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.render.pictures import Baked, PictureSettings, Traced, Unlit, parse_pictures, recorded
-from embodied.render.sightings import FACE, SightingTable, load_table, save_table, sightings_table
+from embodied.render.sightings import FACE, SightingTable, sightings_table
 from embodied.scene.house_meshes import Part, house_parts, instance_classes, owners
 from embodied.scene.lit_pages import LitPages
 
@@ -555,10 +559,10 @@ class World:
     def _sightings(self) -> SightingTable:
         code = code_digest(*makers(Unlit()), "embodied.render.ray_casting", "embodied.render.sightings")
         path = self.cache / "sightings" / f"{digest(self._origin, code)[:32]}.npz"
-        table = load_table(path)
+        table = load_record(SightingTable, path)
         if table is None:
             table = sightings_table(self._seen_from_nodes(), len(self.house.placements))
-            save_table(path, table)
+            save_record(table, path)
         return table
 
     def _seen_from_nodes(self) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 
 from embodied.assets.importing.obj import MtlMaterial
+from embodied.assets.json_file import read_toml
 from embodied.assets.records import Finish
 
 MIRROR = re.compile(r"mirror|espejo|miroir|spiegel|reflejo", re.IGNORECASE)
@@ -68,22 +69,9 @@ def finish_of(material: MtlMaterial, has_texture: bool) -> Finish:
     )
 
 
-LOOK_WORDS: dict[str, dict[str, Any]] = {
-    "mirror": {"color": (0.9, 0.9, 0.9, 1.0), "roughness": 0.03, "metallic": 1.0, "mirror": True},
-    "glass": {"roughness": 0.05, "metallic": 0.0, "specular": 0.5},
-    "metal": {"roughness": 0.3, "metallic": 1.0},
-    "chrome": {"color": (0.8, 0.8, 0.8, 1.0), "roughness": 0.15, "metallic": 1.0},
-    "cloth": {"roughness": 0.95, "metallic": 0.0, "specular": 0.1},
-    "bedding": {"roughness": 0.95, "metallic": 0.0, "specular": 0.1},
-    "leather": {"roughness": 0.5, "metallic": 0.0},
-    "wood": {"roughness": 0.55, "metallic": 0.0},
-    "plastic": {"roughness": 0.4, "metallic": 0.0},
-    "ceramic": {"roughness": 0.15, "metallic": 0.0},
-    "paint": {"roughness": 0.45, "metallic": 0.0},
-    "matt": {"roughness": 0.9, "metallic": 0.0, "specular": 0.3},
-    "terry": {"roughness": 0.97, "metallic": 0.0, "specular": 0.05},
-    "chipboard": {"roughness": 0.7, "metallic": 0.0},
-    "plain": {},
+LOOK_WORDS = {
+    word: {name: tuple(value) if name == "color" else value for name, value in row.items()}
+    for word, row in read_toml(Path(__file__).with_name("looks.toml")).items()
 }
 """Words by which a reviewer corrects a material in catalogue.json."""
 
@@ -100,7 +88,7 @@ def corrected(finish: Finish, look: str) -> tuple[Finish, bool]:
     keep = True
     for word in look.split():
         if word in LOOK_WORDS:
-            change = dict(LOOK_WORDS[word])
+            change = LOOK_WORDS[word]
             keep = keep and "color" not in change
         elif re.fullmatch(r"#[0-9a-fA-F]{6}", word):
             rgb = [int(word[i : i + 2], 16) / 255 for i in (1, 3, 5)]

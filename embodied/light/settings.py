@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from embodied.assets.closure import code_digest
+from embodied.assets.json_file import from_plain, read_toml
 
 UNCOUNTED_BY_LIGHT = (
     "embodied.assets",
@@ -59,35 +61,7 @@ class LightSettings:
     (`atlas.coarsened`)."""
 
 
-QUALITIES = {
-    "fast": LightSettings(
-        density=20.0,
-        budget=800.0,
-        sky_rays=8,
-        lamp_rays=8,
-        other_rays=8,
-        sun_rays=4,
-        patches=48,
-        sharpness=0.45,
-        tolerance=0.2,
-        jpeg=88,
-        rows=512,
-    ),
-    "normal": LightSettings(),
-    "high": LightSettings(
-        density=56.0,
-        budget=14000.0,
-        sky_rays=16,
-        lamp_rays=16,
-        other_rays=48,
-        sun_rays=16,
-        patches=96,
-        bounce_rays=8,
-        seen_rays=48,
-        jpeg=94,
-        texels=120e6,
-    ),
-}
+QUALITIES = from_plain(dict[str, LightSettings], read_toml(Path(__file__).with_name("qualities.toml")))
 """Named settings: for data sets, for looking, for pictures of single houses."""
 
 

@@ -11,11 +11,13 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
 
 from embodied.assets.decoding import jpeg
+from embodied.assets.json_file import from_plain, read_toml
 from embodied.seeds import stream
 
 CAMERAS = ("ideal", "phone", "robot")
@@ -30,9 +32,6 @@ BLOOM = ((0.55, 0.006), (0.3, 0.025), (0.15, 0.1))
 and wide skirts stand for the 1/angle^2 of glare (Spencer et al. 1995, eq. 2 to 4)."""
 FULL_WELL = 6000.0
 """Electrons of a full pixel at ISO 100: that of small sensors with pixels of 1.4 to 3 um."""
-ISO = {"phone": 130.0, "robot": 330.0}
-"""ISO that shows a white sheet of 100 cd/m2 as white: f/1.8 and 1/60 s of a hand-held phone, f/2.2 and 1/100 s of a
-robot that drives, from the exposure equation of ISO 2720, L t S / N^2 = 12.5, with 18 % of the sheet as L."""
 
 
 @dataclass(frozen=True)
@@ -70,38 +69,7 @@ class CameraTraits:
     """Quality of the JPEG that is stored or streamed."""
 
 
-RANGES: dict[str, dict[str, tuple[float, float]]] = {
-    "phone": {
-        "metering": (0.45, 0.65),
-        "bias": (-0.15, 0.25),
-        "most": (1.2, 1.2),
-        "balancing": (0.1, 0.35),
-        "warmth": (-0.04, 0.04),
-        "latitude": (0.8, 0.9),
-        "veil": (0.015, 0.04),
-        "falloff": (0.6, 1.6),
-        "k1": (-0.01, 0.01),
-        "k2": (0.0, 0.0),
-        "rows": (3024, 3024),
-        "read_noise": (1.5, 2.5),
-        "jpeg": (88, 95),
-    },
-    "robot": {
-        "metering": (0.6, 0.9),
-        "bias": (-0.4, 0.4),
-        "most": (1.5, 1.5),
-        "balancing": (0.1, 0.6),
-        "warmth": (-0.12, 0.12),
-        "latitude": (0.2, 0.6),
-        "veil": (0.02, 0.06),
-        "falloff": (2.5, 4.5),
-        "k1": (-0.22, -0.06),
-        "k2": (0.0, 0.03),
-        "rows": (480, 800),
-        "read_noise": (2.5, 4.5),
-        "jpeg": (55, 80),
-    },
-}
+RANGES = from_plain(dict[str, dict[str, tuple[float, float]]], read_toml(Path(__file__).with_name("cameras.toml")))
 """From where to where the traits of devices of a kind lie; all are drawn evenly."""
 
 
@@ -127,7 +95,7 @@ def camera_traits(name: str, *, rng: np.random.Generator) -> CameraTraits | None
     of = {trait: float(rng.uniform(*ends)) for trait, ends in RANGES[name].items()}
     radial = of.pop("k1"), of.pop("k2")
     whole = {trait: round(of.pop(trait)) for trait in ("rows", "jpeg")}
-    return CameraTraits(radial=radial, iso=ISO[name], **whole, **of)  # type: ignore[arg-type]
+    return CameraTraits(radial=radial, **whole, **of)  # type: ignore[arg-type]
 
 
 class PhotoCamera:

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from embodied.assets.cache import DAMAGED, atomic_path
-from embodied.assets.decoding import open_arrays
 from embodied.house.house import House
 from embodied.interface import Sighting
 from embodied.render.panorama import face_rays, ray_stretch
@@ -29,6 +26,10 @@ class SightingTable:
     pitch: np.ndarray
     distance: np.ndarray
     pixels: np.ndarray
+
+    def __post_init__(self) -> None:
+        if len({len(column) for column in vars(self).values()}) != 1:
+            raise ValueError("the columns of sightings should be of one length")
 
     def at(self, node: int, house: House) -> tuple[Sighting, ...]:
         """The sightings of one node, the largest first."""
@@ -69,21 +70,3 @@ def _rows(node: int, depth: np.ndarray, ids: np.ndarray, placements: int) -> tup
     x, y, z = direction[order].T
     azimuth, elevation = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
     return np.full(len(order), node), order, azimuth, elevation, distance[order], pixels[order]
-
-
-def save_table(path: Path, table: SightingTable) -> None:
-    """Write `table` to `path` (.npz) atomically."""
-    with atomic_path(path) as temporary, open(temporary, "wb") as f:
-        np.savez_compressed(f, **{name: getattr(table, name) for name in SIGHTING_COLUMNS})
-
-
-def load_table(path: Path) -> SightingTable | None:
-    """Table that `save_table` wrote; None where there is no such file or it is damaged, so that it is made again."""
-    try:
-        with open_arrays(path) as file:
-            columns = [file[name] for name in SIGHTING_COLUMNS]
-    except (OSError, *DAMAGED):
-        return None
-    if len({len(c) for c in columns}) != 1:
-        return None
-    return SightingTable(*columns)

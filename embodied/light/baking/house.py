@@ -22,13 +22,13 @@ from tqdm import tqdm
 
 from embodied.assets.cache import digest, write_bytes, write_json
 from embodied.assets.catalogue import Catalogue
-from embodied.assets.decoding import jpeg
+from embodied.assets.decoding import jpeg, save_record
 from embodied.house.house import WEATHERS, House, Sky
 from embodied.light.backend import LightingCache, device, free_memory, get_or_compute, warn
 from embodied.light.baking.compose import Composer, LightSolution, page_of
 from embodied.light.baking.probes import probes_of
 from embodied.light.baking.solve import BakeInput, Radiosity, solve
-from embodied.light.baking.stages import facts_of, kept_light, mark_of, same_atlas
+from embodied.light.baking.stages import facts_of, kept_light
 from embodied.light.baking.surroundings import Outside, daylit, dome_mesh, outside_of
 from embodied.light.pages import tone
 from embodied.light.pages.atlas import Atlas, atlas_of, coarsened, things_of
@@ -44,7 +44,6 @@ from embodied.light.pages.files import (
     write_pages,
 )
 from embodied.light.pages.meshes import meshes_of
-from embodied.light.pages.records import save_record
 from embodied.light.pages.tone import expose
 from embodied.light.settings import QUALITIES, LightSettings, light_code, settings_of
 from embodied.light.tracing.emitters import in_the_open, lamps_of, write_lamps
@@ -283,8 +282,6 @@ def solve_house(
     """Everything up to the light of every luxel, which is kept in `folder` where one is given."""
     clock = _Clock({} if took is None else took)
     atlas = context.atlas
-    if folder is not None:
-        same_atlas(folder, get_or_compute(context.memory, "mark", lambda: mark_of(atlas)))
     outdoors = outdoors_of(house, settings.rows)
     clock("outdoors")
     space = with_env(context.space, outdoors.picture)

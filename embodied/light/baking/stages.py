@@ -7,35 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from embodied.assets.cache import atomic_path, digest, write_bytes
+from embodied.assets.cache import atomic_path
+from embodied.assets.decoding import load_record
 from embodied.light.backend import device, warn
 from embodied.light.baking.compose import LightSolution
 from embodied.light.baking.solve import Radiosity
-from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.files import checksum
-from embodied.light.pages.records import load_record
 from embodied.light.settings import light_code
 from embodied.scene.house_meshes import owners
 from embodied.scene.lit_pages import LitMesh
-
-
-def mark_of(atlas: Atlas) -> str:
-    """Hex digest of an atlas: its meshes and textures."""
-    return digest(
-        [
-            digest(p.corners.tobytes(), p.luxels.tobytes(), p.uv.tobytes(), p.fineness, repr(p.finishes))
-            for p in atlas.pages
-        ]
-    )
-
-
-def same_atlas(folder: Path, mark: str) -> None:
-    """Empty `folder` if what an interrupted run left there belongs to an atlas of another `mark_of`."""
-    path = folder / "atlas.txt"
-    if not path.exists() or path.read_text() != mark:
-        for old in sorted(p for p in folder.iterdir() if not p.name.startswith(".")):  # which holds a lock, too
-            old.unlink()
-        write_bytes(path, mark.encode())
 
 
 def kept_light(folder: Path | None, n: int, work: Callable[[], Radiosity]) -> Radiosity:

@@ -17,11 +17,10 @@ import cv2
 import numpy as np
 
 from embodied.assets.cache import write_files
-from embodied.assets.decoding import jpeg, open_arrays, read_picture
+from embodied.assets.decoding import jpeg, load_record, open_arrays, packed, read_picture
 from embodied.assets.json_file import read_json
 from embodied.house.house import House
 from embodied.light.backend import LightError, LightingCache, get_or_compute, warn
-from embodied.light.pages.records import load_record, packed
 from embodied.light.pages.tone import Exposure
 from embodied.light.probes import Probes
 from embodied.light.settings import light_code

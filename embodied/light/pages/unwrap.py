@@ -20,10 +20,10 @@ from scipy.sparse.csgraph import connected_components
 
 from embodied.assets.cache import digest
 from embodied.assets.closure import code_digest
+from embodied.assets.decoding import load_record, save_record
 from embodied.assets.records import MeshPart
 from embodied.geometry import r2
 from embodied.light.backend import Array, accumulate, dr, floats, fraction, mi, scene_of, vector
-from embodied.light.pages.records import load_record, save_record
 
 ONCE = 6000.0
 """Budget for which models are unwrapped; other budgets get the same charts at another density."""

@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 
 from embodied.assets.cache import write_bytes
-from embodied.assets.decoding import open_arrays
+from embodied.assets.decoding import open_arrays, packed
 from embodied.geometry import r2
 from embodied.house.house import House, Opening
 from embodied.house.shapes import inward
 from embodied.light.backend import Array, RayScene, accumulate, dr, fraction, mi, opaque_float, vector
 from embodied.light.pages.atlas import Atlas
-from embodied.light.pages.records import packed
 from embodied.light.pages.unwrap import areas_of, face_normals
 
 GLAZED = ("window", "french_window")
