@@ -46,7 +46,7 @@ from embodied.agents.vision.config import PLAIN
 from embodied.agents.vision.features import load_features, save_features
 from embodied.agents.vision.labels import HouseStrips
 from embodied.assets.closure import ROOT
-from embodied.assets.decoding import open_arrays, read_picture
+from embodied.assets.decoding import load_record, open_arrays, read_picture, save_record
 from embodied.assets.importing.own import import_own, read_own
 from embodied.assets.json_file import RecordError, read_json, read_toml
 from embodied.assets.rows import DATA
@@ -67,7 +67,7 @@ from embodied.records import load_lines, save_lines, to_json
 from embodied.render import panorama_file
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
-from embodied.render.sightings import load_table, save_table, sightings_table
+from embodied.render.sightings import SightingTable, sightings_table
 from embodied.scene import model
 from embodied.seeds import stream
 from embodied.serve.store import Event, Store
@@ -343,12 +343,12 @@ def strips(folder: Path, data: Dataset) -> Kind:
 @kind
 def sightings(folder: Path, data: Dataset) -> Kind:
     def read(path: Path) -> object:
-        table = load_table(path)
+        table = load_record(SightingTable, path)
         if table is None:
             raise ValueError("made anew")
         return {f.name: np.asarray(getattr(table, f.name)).tolist() for f in dataclasses.fields(table)}
 
-    save_table(folder / "sightings.npz", sightings_table([(np.ones((6, 4, 4)), np.full((6, 4, 4), 2))], 3))
+    save_record(sightings_table([(np.ones((6, 4, 4)), np.full((6, 4, 4), 2))], 3), folder / "sightings.npz")
     return Kind(folder / "sightings.npz", read)
 
 
