@@ -173,7 +173,7 @@ class ImportRecipe:
     dropped: tuple[str, ...] = ()
     """Materials that are left out: shadows painted on the floor, helper planes."""
     looks: tuple[tuple[str, str], ...] = ()
-    """Material and the reviewer's words for it (embodied.assets.importing.mtl_finish.corrected)."""
+    """Material and the reviewer's words for it (embodied.assets.importing.looks.corrected)."""
     faces: int = 0
     """Face budget; 0 takes FACE_BUDGETS."""
     model: str = ""

@@ -305,7 +305,7 @@ class World:
     def _light_for_moment(self) -> bool:
         """Make what moves anew where other lamps are on, or carried, than before; True where that was so."""
         from embodied.light import bake  # late: these load the path tracer
-        from embodied.light.carried import carried_lamps
+        from embodied.light.gather import carried_lamps
         from embodied.light.moving import MovingHouse
 
         carriers = carried_lamps(self.house, self.moment)
@@ -679,8 +679,8 @@ def gloss_of(bake: Bake, *, detail: bool = True, moving: MovingHouse | None = No
     Args:
       moving: the house as it is with what moves in it.
     """
+    from embodied.light.backend import rays_among
     from embodied.light.pages.gloss_data import gloss_data_of  # late: loads the path tracer
-    from embodied.light.tracing.rays import rays_among
     from embodied.render.gloss import Gloss
 
     if moving is not None:
@@ -695,7 +695,7 @@ def makers(pictures: PictureSettings) -> tuple[str, ...]:
     if pictures.quality is not None:
         modules.append("embodied.light.baking.house")
     if _reflects(pictures):
-        modules += ["embodied.render.gloss", "embodied.light.tracing.rays"]
+        modules += ["embodied.render.gloss", "embodied.light.backend"]
     if isinstance(pictures, Traced):
         modules.append("embodied.light.tracing.reference")
     return tuple(modules)

@@ -322,7 +322,7 @@ def light_at(solution, p: radiosity.Points) -> np.ndarray:
         radiosity.meet(s.space, p, 1024),
     )
     e = radiosity.gather(met, table)[0] / met.rays + luxels.AMBIENT
-    for source in solve.sources_of(inputs):
+    for source in (*emitters.portals_of(inputs.house), *inputs.lamps):
         if isinstance(source, emitters.Portal):
             e += array(radiosity.sky_light(s.space, p, source, lights.sky_rays))
         else:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from embodied.assets.importing.covers import COVERS, cover_of, creased, kind_of, laid_on, picture
+from embodied.assets.importing.looks import COVERS, cover_of, creased, kind_of, laid_on, picture
 
 OAK, WHITE = (0.72, 0.58, 0.42), (0.9, 0.9, 0.9)
 

@@ -25,9 +25,18 @@ from scipy.sparse.csgraph import connected_components
 from embodied.assets.cache import atomic_path, digest, write_bytes, write_json
 from embodied.assets.closure import code_digest
 from embodied.assets.decoding import open_arrays
-from embodied.assets.importing.covers import COVERS, FOLDED, cover_of, creased, kind_of, laid_on, picture
+from embodied.assets.importing.looks import (
+    COVERS,
+    FOLDED,
+    corrected,
+    cover_of,
+    creased,
+    finish_of,
+    kind_of,
+    laid_on,
+    picture,
+)
 from embodied.assets.importing.meshing import CREASE, crease_normals, decimate, face_normals, indexed, sound_faces, weld
-from embodied.assets.importing.mtl_finish import corrected, finish_of
 from embodied.assets.importing.obj import (
     MaterialFaces,
     MeshError,
@@ -91,7 +100,7 @@ class RawPart:
     finish: Finish
     image: Image.Image | None = None
     cover: str | None = None
-    """The cover that it is given, folds alone where it has an image (embodied.assets.importing.covers)."""
+    """The cover that it is given, folds alone where it has an image (embodied.assets.importing.looks)."""
     two_sided: bool = False
     """Seen from behind, too, where it is open."""
     least: float | None = 0.5

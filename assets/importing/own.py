@@ -11,7 +11,7 @@ from embodied.assets import rows
 from embodied.assets.cache import digest
 from embodied.assets.importing.glb import read_glb
 from embodied.assets.importing.importer import Reader, cached, obj_files, read_if_there, read_obj
-from embodied.assets.importing.mtl_finish import corrected
+from embodied.assets.importing.looks import corrected
 from embodied.assets.importing.obj import MeshError
 from embodied.assets.importing.sh3f import MAX_ENTRY, open_pack
 from embodied.assets.json_file import RecordError, from_plain, shown

@@ -69,7 +69,7 @@ class MovingHouse:
         """
         Args:
           cache: the folder that everything expensive is kept in.
-          carriers: what carries a lamp that is on, by light id (embodied.light.carried.carried_lamps).
+          carriers: what carries a lamp that is on, by light id (embodied.light.gather.carried_lamps).
           dark: the house with these lamps off, where there are any.
         """
         self.bake, self.house, self.catalogue = bake, house, catalogue

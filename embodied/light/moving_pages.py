@@ -16,8 +16,19 @@ import numpy as np
 from embodied.house.house import House
 from embodied.house.moment import RigidPose
 from embodied.house.shapes import room_at
-from embodied.light.carried import Blocked, SentBack, by_carrier, direct, fitting_of, lamp_at, sent_back
-from embodied.light.gather import LitRays, behind, without
+from embodied.light.backend import rays_among
+from embodied.light.gather import (
+    Blocked,
+    LitRays,
+    SentBack,
+    behind,
+    by_carrier,
+    direct,
+    fitting_of,
+    lamp_at,
+    sent_back,
+    without,
+)
 from embodied.light.movers import DISCS, Placed, Surface, cloud_of, hidden_by, hiding, kernels, shadow_box, unhidden
 from embodied.light.pages.colours import linear
 from embodied.light.pages.files import Bake
@@ -26,7 +37,6 @@ from embodied.light.pages.unwrap import areas_of
 from embodied.light.probes import CORNERS, harmonics, radiance
 from embodied.light.tiles import HALF_TILE, SAMPLES, TILE, Receiver, Tile, blocks_of, luxels_in, read_receiver, sampled
 from embodied.light.tracing.emitters import GLAZING, Lamp, portals_of, read_lamps
-from embodied.light.tracing.rays import rays_among
 from embodied.light.tracing.sky import outdoors, sun_direction, sun_height, sun_strength
 from embodied.render.gloss import Rays
 from embodied.scene.lit_pages import LitMesh
@@ -205,13 +215,15 @@ class HousePages:
             self._base[page] = held.soft.astype(np.float32), held.sun.astype(np.float32) / 255
         return self._base[page]
 
-    def _in_the_open(self, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) light of places near each other in an empty room, and (n, 9) coefficients of what arrives there, both as
-        means of the colours."""
-        middle = position[len(position) // 2] + 0.05 * normal[len(position) // 2]
-        around = self.radiance(position, self.room_around(middle)).mean(2)
-        e = np.einsum("nk,nk->n", unhidden(normal, np.zeros(len(normal), bool)), around)
-        return np.maximum(e, 1e-5), around
+    def _in_the_open(self, tile: Tile, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) light that samples of a tile have in an empty room, and (n, 9) coefficients of what arrives there, both
+        as means of the colours; remembered."""
+        if tile not in self._opens:
+            middle = position[len(position) // 2] + 0.05 * normal[len(position) // 2]
+            around = self.radiance(position, self.room_around(middle)).mean(2)
+            e = np.einsum("nk,nk->n", unhidden(normal, np.zeros(len(normal), bool)), around)
+            self._opens[tile] = np.maximum(e, 1e-5), around
+        return self._opens[tile]
 
     @functools.cached_property
     def _of_lamps(self) -> set[Tile]:
@@ -378,7 +390,11 @@ class HousePages:
         for tile in tiles:
             things = [h for h in self._hiding.values() if tile in h.tiles or tile in h.direct]
             new[tile] = _Shown(things, _together([t.tiles[tile] for t in things if tile in t.tiles]))
-        changed = [tile for tile, shown in new.items() if self._differs(tile, shown)]
+        changed = []
+        for tile, now in new.items():
+            shown = self._shown.get(tile)
+            if shown is None or not now.things or any(tile in t.direct for t in (*shown.things, *now.things)):
+                changed.append(tile)
         same = list(new.keys() - set(changed))
         if same:
             passed = [np.stack([some[tile].light[..., 0] for tile in same]) for some in (self._shown, new)]
@@ -386,11 +402,6 @@ class HousePages:
             changed += [tile for tile, differs in zip(same, off, strict=True) if differs]
         self._shown |= {tile: new[tile] for tile in changed}
         yield from self._patches(changed)
-
-    def _differs(self, tile: Tile, new: _Shown) -> bool:
-        """True where a tile surely looks another way than it is shown."""
-        shown = self._shown.get(tile)
-        return shown is None or not new.things or any(tile in t.direct for t in (*shown.things, *new.things))
 
     def _patches(self, tiles: Sequence[Tile]) -> Iterator[Patch]:
         """Tiles as they are to be shown, near ones in one."""
@@ -426,20 +437,13 @@ class HousePages:
         if not len(which):
             return _Hides(tuple(things), {}, frozenset(sunlit))
         position, normal = by_tile(position), by_tile(normal)
-        opens = [self._open(names[k], position[k], normal[k]) for k in which]
+        opens = [self._in_the_open(names[k], position[k], normal[k]) for k in which]
         some = lambda a: by_tile(a)[which].reshape(-1, *a.shape[1:])
         open_, around = (np.concatenate([o[i] for o in opens]) for i in (0, 1))
         passed = _passed(some(share), some(towards), open_, around)
         light = np.concatenate([passed, some(sent)], axis=1).reshape(-1, HALF_TILE, HALF_TILE, 4)
         hidden = {names[k]: one for k, one in zip(which, light, strict=True)}
         return _Hides(tuple(things), hidden, frozenset(sunlit))
-
-    def _open(self, tile: Tile, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) light that samples of a tile have in an empty room, and (n, 9) what arrives there, both as means of the
-        colours; remembered."""
-        if tile not in self._opens:
-            self._opens[tile] = self._in_the_open(position, normal)
-        return self._opens[tile]
 
     def _patch(self, page: int, tiles: np.ndarray) -> Patch:
         """The rectangle around tiles (k, 2); what has no change of light stays as it was baked."""

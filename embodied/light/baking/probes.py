@@ -1,4 +1,7 @@
-"""Light at probes, from a house whose luxels are lit."""
+"""Light at probes, from a house whose luxels are lit, as spherical harmonics of e.
+
+The same lights as in `radiosity`, but one ray serves all normals that a place's light is asked for.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +14,29 @@ import shapely
 
 from embodied.geometry import r2
 from embodied.house.house import House
-from embodied.light.backend import LightingCache, RayScene, floats, get_or_compute, mi, vector
+from embodied.light.backend import (
+    Array,
+    LightingCache,
+    RayScene,
+    accumulate,
+    array,
+    booleans,
+    dr,
+    floats,
+    get_or_compute,
+    mi,
+    opaque_float,
+    opaque_uint,
+    vector,
+)
 from embodied.light.baking.compose import LightSolution
 from embodied.light.baking.solve import BakeInput, clamp_fireflies, leaving, sunlit
-from embodied.light.probes import ORDERS, Probes
+from embodied.light.probes import ORDERS, Probes, lobed, terms
 from embodied.light.settings import LightSettings
-from embodied.light.tracing import air, radiosity
-from embodied.light.tracing.emitters import portals_of
+from embodied.light.tracing import radiosity
+from embodied.light.tracing.emitters import GLAZING, Lamp, Portal, portals_of
 from embodied.light.tracing.luxels import AMBIENT
-from embodied.light.tracing.radiosity import Points
+from embodied.light.tracing.radiosity import LIFT, NOTHING, Met, Patches, Points, Space, env_lookup, hit_luxel
 
 SPACING, MARGIN = 0.5, 0.1
 """Metres between probes, about, and from walls, floor and ceiling to the first of them."""
@@ -42,8 +59,8 @@ def probes_of(s: LightSolution, settings: LightSettings, memory: LightingCache |
     probes = get_or_compute(own, "grids", lambda: seeing(grids(s.house), s.space.scene))
     asked = np.flatnonzero(probes.valid)
     places = get_or_compute(own, "places", lambda: places_of(probes.position[asked]))
-    met = get_or_compute(own, "met", lambda: air.meet_around(s.space, places, AROUND_RAYS))
-    light = air.bounced_at(met, places, floats(clamp_fireflies(s.lux, leaving(s.lux, s.light.soft))))
+    met = get_or_compute(own, "met", lambda: meet_around(s.space, places, AROUND_RAYS))
+    light = bounced_at(met, places, floats(clamp_fireflies(s.lux, leaving(s.lux, s.light.soft))))
     light[:, 0] += np.sqrt(4 * np.pi) * AMBIENT
     rooms = probes.room[asked]
 
@@ -53,15 +70,15 @@ def probes_of(s: LightSolution, settings: LightSettings, memory: LightingCache |
         return reached, source(radiosity.only(places, reached), PROBE_RAYS) if len(reached) else np.zeros((0, 9, 3))
 
     for portal in portals_of(s.house):
-        reached, arriving = shone(functools.partial(air.sky_at, s.space, portal))
+        reached, arriving = shone(functools.partial(sky_at, s.space, portal))
         light[reached] += arriving
     for lamp in s.lamps:
         scene = s.without.get(lamp.owner or "", s.space.scene)
-        lit = functools.partial(shone, functools.partial(air.lamp_at, scene, lamp))
+        lit = functools.partial(shone, functools.partial(lamp_at, scene, lamp))
         reached, arriving = get_or_compute(own, ("lamp", lamp.id), lit)
         light[reached] += arriving * lamp.radiance.astype(np.float32)
     for patches in sunlit(inputs, s.light.sun, settings.patches):
-        light += air.patches_at(s.space.scene, patches, places)
+        light += patches_at(s.space.scene, patches, places)
     coefficients, valid = probes.coefficients.copy(), probes.valid.copy()
     valid[asked] = open_air(met.bad / met.rays, rooms)
     coefficients[asked] = np.clip(light, -6e4, 6e4)
@@ -124,3 +141,116 @@ def places_of(positions: np.ndarray) -> Points:
     up = np.tile(np.array([0, 0, 1], np.float32), (len(positions), 1))
     turn = np.stack([x % 1.0 for x in r2(np.arange(len(positions), dtype=float) * AROUND_RAYS)]).astype(np.float32)
     return radiosity.points_of(positions, up, up, np.zeros(len(positions), bool), turn)
+
+
+BARE = 0.06
+"""Metres around a bare bulb, and square metres of the least squared distance from it, that are no nearer to it."""
+
+
+def sky_at(space: Space, portal: Portal, p: Points, samples: int) -> np.ndarray:
+    """(n, 9, 3) coefficients of e from the outdoors through one portal, by area sampling."""
+    sides = portal.corner, portal.along, portal.up, portal.normal
+    corner, along, up, n = (mi.Vector3f(*(opaque_float(x) for x in a)) for a in sides)
+    area = opaque_float(portal.area * GLAZING)
+
+    def place(k: Array) -> tuple[Array, Callable]:
+        u = p.sample(k)
+        extent = lambda d, far: area * dr.maximum(-dr.dot(n, d), 0.0) / dr.maximum(dr.square(far), 1e-4)
+        return mi.Point3f(corner + along * u.x + up * u.y), lambda d, far: env_lookup(space.env, d) * extent(d, far)
+
+    return _arriving(space.scene, p, samples, place, 4 * LIFT) / samples
+
+
+def lamp_at(scene: RayScene, lamp: Lamp, p: Points, samples: int) -> np.ndarray:
+    """(n, 9, 1) coefficients of e from one lamp of radiance 1."""
+    bare, count = not lamp.normals.any(), opaque_uint(len(lamp.points))
+    at, out, weights, area = floats(lamp.points), floats(lamp.normals), floats(lamp.weights), opaque_float(lamp.area)
+
+    def place(k: Array) -> tuple[Array, Callable]:
+        i = dr.minimum(mi.UInt32(p.sample(k).x * mi.Float(count)), count - 1)
+        strength = dr.gather(mi.Float, weights, i) * area
+        leaving = lambda d: 1.0 if bare else dr.maximum(-dr.dot(dr.gather(mi.Vector3f, out, i), d), 0.0)
+        extent = lambda d, far: strength * leaving(d) / dr.maximum(dr.square(far), BARE if bare else 1e-4)
+        return dr.gather(mi.Point3f, at, i), lambda d, far: mi.Color3f(dr.minimum(extent(d, far), 4 * dr.pi))
+
+    return _arriving(scene, p, samples, place, BARE if bare else 4 * LIFT)[..., :1] / samples
+
+
+def patches_at(scene: RayScene, patches: Patches, p: Points) -> np.ndarray:
+    """(n, 9, 3) coefficients of e from sunlit patches."""
+    lift = np.where(patches.thin[:, None], 0.0, LIFT)
+    places, normals = floats(patches.position + patches.normal * lift), floats(patches.normal)
+    both, flux, extent = booleans(patches.thin), floats(patches.flux), floats(patches.extent / np.pi)
+
+    def place(k: Array) -> tuple[Array, Callable]:
+        def light(d: Array, far: Array) -> Array:
+            leaving = -dr.dot(dr.gather(mi.Vector3f, normals, k), d)
+            leaving = dr.select(dr.gather(mi.Bool, both, k), dr.abs(leaving), dr.maximum(leaving, 0.0))
+            return dr.gather(mi.Color3f, flux, k) * (leaving / (dr.square(far) + dr.gather(mi.Float, extent, k)))
+
+        return dr.gather(mi.Point3f, places, k), light
+
+    return _arriving(scene, p, len(patches.flux), place, 3 * LIFT)
+
+
+def meet_around(space: Space, p: Points, rays: int) -> Met:
+    """Send rays from places, evenly in all directions."""
+    luxels, lane, count = dr.zeros(mi.UInt32, rays * p.n), dr.arange(mi.UInt32, p.n), opaque_uint(p.n)
+
+    def one(k: Array) -> tuple[Array, ...]:
+        luxel, hit, front, near = hit_luxel(space, mi.Ray3f(p.position, _everywhere(p, k)))
+        dr.scatter(luxels, dr.select(hit & front, luxel, NOTHING), k * count + lane)
+        return (dr.select(hit & (~front | near), 1.0, 0.0),)
+
+    (bad,) = accumulate(rays, one, dr.zeros(mi.Float, p.n))
+    dr.eval(luxels)
+    return Met(rays, luxels, np.array(bad))
+
+
+def bounced_at(met: Met, p: Points, table: Array) -> np.ndarray:
+    """(n, 9, 3) coefficients of e from what rays of places met.
+
+    Args:
+      table: flat (n luxels * 3), radiosity of the whole house on the device.
+    """
+    lane, count = dr.arange(mi.UInt32, p.n), opaque_uint(p.n)
+
+    def one(k: Array) -> tuple[Array, ...]:
+        luxel = dr.gather(mi.UInt32, met.luxels, k * count + lane)
+        colour, d = dr.gather(mi.Color3f, table, luxel, luxel != NOTHING), _everywhere(p, k)
+        return tuple(colour * y for y in terms(d.x, d.y, d.z))
+
+    return _summed(met.rays, one, p.n) * (4 * np.pi / met.rays)
+
+
+def _everywhere(p: Points, k: Array) -> Array:
+    """The k-th direction of every place, even over the sphere."""
+    return mi.warp.square_to_uniform_sphere(p.sample(k))
+
+
+def _arriving(scene: RayScene, p: Points, samples: int, place: Callable, gap: float) -> np.ndarray:
+    """(n, 9, 3) sums of e over places that shine.
+
+    Args:
+      place: from a number to a place and, of direction and distance, its radiance times its solid angle.
+      gap: metres before the place where a shadow ray ends.
+    """
+
+    def one(k: Array) -> tuple[Array, ...]:
+        q, light = place(k)
+        d = q - p.position
+        far = dr.norm(d)
+        d /= dr.maximum(far, 1e-6)
+        colour = light(d, far)
+        active = (far > gap) & (dr.max(colour) > 0)
+        free = active & ~scene.ray_test(mi.Ray3f(p.position, d, far - gap, 0.0, []), active)
+        colour = dr.select(free, colour, 0.0)
+        return tuple(colour * y for y in terms(d.x, d.y, d.z))
+
+    return _summed(samples, one, p.n)
+
+
+def _summed(samples: int, one: Callable[[Array], tuple[Array, ...]], n: int) -> np.ndarray:
+    """(n, 9, 3) coefficients of e from sums of what `one` returns: nine of radiance."""
+    totals = accumulate(samples, one, *(dr.zeros(mi.Color3f, n) for _ in range(9)))
+    return lobed(np.stack([array(total) for total in totals], axis=1))

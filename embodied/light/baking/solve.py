@@ -115,11 +115,6 @@ class BakeInput:
         return radiosity.only(self.points, luxels)
 
 
-def sources_of(inputs: BakeInput) -> tuple[Portal | Lamp, ...]:
-    """Sky and lamps."""
-    return *portals_of(inputs.house), *inputs.lamps
-
-
 def _shine(inputs: BakeInput, source: Portal | Lamp, i: np.ndarray, rays: int | None = None) -> np.ndarray:
     """(m, 3) e that a source gives to luxels (m,), by so many rays; by those of the settings, and remembered, without a
     number."""
@@ -330,7 +325,7 @@ def solve(
 ) -> Radiosity:
     """The light of a house."""
     atlas, lux = inputs.atlas, inputs.lux
-    sources, direct = sources_of(inputs), np.zeros((len(lux.position), 3), np.float32)
+    sources, direct = (*portals_of(inputs.house), *inputs.lamps), np.zeros((len(lux.position), 3), np.float32)
     for k, source in enumerate(sources):
         tell("direct light", k / len(sources))
         which, e = shone_on(inputs, source)
