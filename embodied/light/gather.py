@@ -1,5 +1,5 @@
-"""The light that arrives at places of a lit house: what its pages send, and the sky, gathered by rays; and that of lamps
-that are carried through it: their own, past all that stands in its way, and what the room sends back of it.
+"""The light that arrives at places of a lit house: what its pages send, and the sky, gathered by rays; and that of
+lamps that are carried through it: their own, past all that stands in its way, and what the room sends back of it.
 
 Source: final gathering: M. Reichert, A two-pass radiosity method driven by lights and viewer position (1992).
 """
