@@ -13,7 +13,7 @@ from handmade_models import CUBE, write_own, write_pack
 
 from embodied.assets.built import BUILT_ASSETS
 from embodied.assets.catalogue import attribution, load_catalogue
-from embodied.assets.importing import packs
+from embodied.assets.importing import sh3f
 from embodied.assets.importing.importer import finish_parts, read_obj
 from embodied.assets.importing.obj import MeshError, parse_obj
 from embodied.assets.importing.sh3f import CATALOGUE, MAX_ENTRY, PackError, find_packs, open_pack
@@ -157,11 +157,11 @@ def test_a_damaged_cache_is_repaired(tmp_path, damage, suffix):
 def test_a_missing_pack_is_named_with_the_remedy_and_an_installed_one_is_found_by_all(tmp_path, monkeypatch):
     library = next(p for p in find_packs() if "scopia/bed1" in open_pack(p).entries)
     for name in ("SYSTEM_FOLDER", "OWN_FOLDER"):
-        monkeypatch.setattr(packs, name, tmp_path / name)
-    monkeypatch.setattr(packs, "WHEEL", "no_such_package")
+        monkeypatch.setattr(sh3f, name, tmp_path / name)
+    monkeypatch.setattr(sh3f, "WHEEL", "no_such_package")
     with pytest.raises(PackError, match="sweethome3d-furniture.*--pack"):
         load_catalogue(tmp_path).mesh("scopia/bed1")
-    assert list(packs.install_packs([library])) == [tmp_path / "OWN_FOLDER" / library.name]
+    assert list(sh3f.install_packs([library])) == [tmp_path / "OWN_FOLDER" / library.name]
     assert load_catalogue(tmp_path).mesh("scopia/bed1")
     with pytest.raises(PackError, match="does not exist"):
         find_packs([tmp_path / "none.sh3f"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 
-import embodied.assets.importing.sh3f as packs
+import embodied.assets.importing.sh3f as sh3f
 from embodied.assets.built import BASICS
 from embodied.assets.catalogue import _tell_once, load_catalogue
 from embodied.generate import HouseConfig, generate_house
@@ -12,9 +12,9 @@ from embodied.generate.requirements import missing_requirements
 
 
 def test_a_house_without_models_lacks_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(packs, "SYSTEM_FOLDER", tmp_path / "none")
-    monkeypatch.setattr(packs, "OWN_FOLDER", tmp_path / "none")
-    monkeypatch.setattr(packs, "WHEEL", "no_such_package")
+    monkeypatch.setattr(sh3f, "SYSTEM_FOLDER", tmp_path / "none")
+    monkeypatch.setattr(sh3f, "OWN_FOLDER", tmp_path / "none")
+    monkeypatch.setattr(sh3f, "WHEEL", "no_such_package")
     _tell_once.cache_clear()
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import pytest
 
 from embodied import gl, software
-from embodied.assets.importing import packs
+from embodied.assets.importing import sh3f
 from embodied.cli import doctor
 
 
@@ -90,7 +90,7 @@ def test_where_pip_has_no_furniture_debians_is_brought_or_the_way_to_make_it_is_
     own = tmp_path / "share"
     monkeypatch.setattr(subprocess, "run", run)
     for name, value in (("SYSTEM_FOLDER", tmp_path / "none"), ("OWN_FOLDER", own), ("WHEEL", "no_such_package")):
-        monkeypatch.setattr(packs, name, value)
+        monkeypatch.setattr(sh3f, name, value)
     for where, name in ((gl, "available"), (doctor, "load_atomic")):
         monkeypatch.setattr(where, name, lambda: True)
     monkeypatch.setattr("embodied.light.backend.find_llvm", lambda: "here")
@@ -100,6 +100,6 @@ def test_where_pip_has_no_furniture_debians_is_brought_or_the_way_to_make_it_is_
         "pip finds no such wheel; apt-get download sweethome3d-furniture, which goes into this environment",
     ]
     if apt:
-        assert len(said) == 2 and packs.find_packs() == (own / "Scopia.sh3f",) and not list(doctor.fix())
+        assert len(said) == 2 and sh3f.find_packs() == (own / "Scopia.sh3f",) and not list(doctor.fix())
     else:
-        assert len(said) == 3 and "make wheels" in said[2] and packs.find_packs() == ()
+        assert len(said) == 3 and "make wheels" in said[2] and sh3f.find_packs() == ()

@@ -13,6 +13,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -84,7 +85,7 @@ def finish_of(material: MtlMaterial, has_texture: bool) -> Finish:
     )
 
 
-LOOK_WORDS = {
+LOOK_WORDS: dict[str, dict[str, Any]] = {
     word: {name: tuple(value) if name == "color" else value for name, value in row.items()}
     for word, row in read_toml(Path(__file__).with_name("looks.toml")).items()
 }

@@ -325,7 +325,8 @@ def solve(
 ) -> Radiosity:
     """The light of a house."""
     atlas, lux = inputs.atlas, inputs.lux
-    sources, direct = (*portals_of(inputs.house), *inputs.lamps), np.zeros((len(lux.position), 3), np.float32)
+    sources: tuple[Portal | Lamp, ...] = (*portals_of(inputs.house), *inputs.lamps)
+    direct = np.zeros((len(lux.position), 3), np.float32)
     for k, source in enumerate(sources):
         tell("direct light", k / len(sources))
         which, e = shone_on(inputs, source)
