@@ -16,11 +16,8 @@ from embodied import gl
 from embodied.assets.cache import default_cache, digest
 from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
-<<<<<<< HEAD
-from embodied.assets.moving_parts import openness_of
-=======
 from embodied.assets.decoding import load_record, save_record
->>>>>>> c11f6549 (Cameras, qualities of light and reviewers' words for looks are tables; sightings and bakes are written by one function)
+from embodied.assets.moving_parts import openness_of
 from embodied.house.house import HINGED, House
 from embodied.house.moment import WIDEST, Moment, RigidPose, apart
 from embodied.house.validation import load_lit_house
