@@ -9,13 +9,12 @@ import pytest
 from hand_worlds import grid_world, line_world, room, thing
 
 from embodied.assistants.descriptions import Describer, dropped, frequent_classes
-from embodied.assistants.hari import HariAssistant, Uncooperative, subgoal
 from embodied.envs.base import ActionError
 from embodied.envs.hari import HariEnv, HariExtras, shaped_costs
 from embodied.evaluation.evaluate import play
 from embodied.interface import Ask, Feature, FindObject, Intention, Mode, Move, Pose, Stop, Task
 from embodied.kinds import metrics
-from embodied.kinds.shipped.hari import hari_pool, hari_task
+from embodied.kinds.shipped.hari import HariAssistant, Uncooperative, hari_pool, hari_task, subgoal
 from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import count_hops
 from embodied.policies.baselines import HalfwaySkyline, Shortest

@@ -28,12 +28,11 @@ from embodied.agents.hari.study import HariStudy
 from embodied.agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, percept
 from embodied.agents.studies.engine import run_study
 from embodied.assistants.descriptions import Describer, frequent_classes
-from embodied.assistants.hari import HariAssistant
 from embodied.envs.hari import Costs, HariEnv
 from embodied.evaluation.evaluate import play
 from embodied.house.house import House, Opening, Storey
 from embodied.interface import Ask, Candidates, Feature, FindObject, Intention, Move, Pose, Task
-from embodied.kinds.shipped.hari import PRETRAINING, hari_pool, hari_task
+from embodied.kinds.shipped.hari import PRETRAINING, HariAssistant, hari_pool, hari_task
 from embodied.language.plain_language import PlainLanguage
 from embodied.records import identity_of, read_json
 

@@ -33,7 +33,7 @@ from embodied.render.pictures import Baked
 from embodied.tasks.goals import find_pool, find_task
 from embodied.viz import house3d, recording
 from embodied.viz.recording import PictureSizes, camera_axes, record
-from embodied.viz.sinks import Sinks, blueprint_of, checked_viewer, listens, open_recording, sees_title
+from embodied.viz.sinks import Sinks, blueprint_of, check_connected, listens, open_recording, sees_title
 from embodied.viz.video import camera_track, write_video
 from embodied.world import open_world
 
@@ -109,8 +109,8 @@ def test_the_demo_records_two_walks_and_its_agent_sees_the_panoramas_that_are_sh
     monkeypatch.setattr(generate, "generate_house", lambda seed, catalogue: world.house)
     monkeypatch.setattr(house3d, "BUDGET", 10**9)  # simpler meshes are looked at above
 
-    def kept(args, world, viewers):
-        facts = find(args, world, viewers)
+    def kept(args, world):
+        facts = find(args, world)
         fed.clear(), poses.clear()
         logged.update({path: [] for path in logged})
         found.extend(world.panorama(n).rgb for n in range(len(world.graph.ids)))
@@ -160,10 +160,11 @@ def test_what_is_sent_to_a_viewer_arrives(world, tmp_path):
         until = time.monotonic() + 300
         while not listens("127.0.0.1", port) and time.monotonic() < until:
             time.sleep(0.1)
-        viewers = (checked_viewer(f"rerun+http://127.0.0.1:{port}/proxy"),)
+        viewer_url = f"rerun+http://127.0.0.1:{port}/proxy"
+        check_connected(viewer_url)
         steps = [f.step for f in rollout(lambda: HelpEnv({world.name: world}), Shortest(), [task], seed=0)]
         for _ in range(2):  # a second recording follows the first into the same viewer
-            with open_recording(Sinks(None, viewers), rrb.Blueprint(), name="sent", properties={}) as recording:
+            with open_recording(Sinks(None, viewer_url), rrb.Blueprint(), name="sent", properties={}) as recording:
                 list(record(recording, world, task, steps, pictures=PictureSizes((48, 64), 32)))
 
         def held() -> int:

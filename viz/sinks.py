@@ -1,4 +1,4 @@
-"""Targets of a recording, a file, running viewers, or several of them, and how viewers lay it out."""
+"""Targets of a recording, a file, a running viewer, or both, and how viewers lay it out."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ FOOTER = b"RRF2FOOT"
 
 @dataclass(frozen=True)
 class Sinks:
-    """Targets of one recording; all that are set are served."""
+    """Targets of one recording; both are served."""
 
     rrd: Path | None = None
     """File to write; it appears complete or not at all."""
-    viewers: tuple[str, ...] = ()
-    """URLs of running viewers and servers."""
+    viewer: str | None = None
+    """URL of a running viewer or server."""
 
 
-def checked_viewer(url: str) -> str:
-    """The URL of a running viewer, for `Sinks.viewers`; what cannot be watched is said before any work is done.
+def check_connected(url: str) -> None:
+    """Refuse the URL of a viewer that does not run, before any work is done.
 
     Raises:
       ValueError: no URL of a viewer.
@@ -59,7 +59,6 @@ def checked_viewer(url: str) -> str:
         raise UnableError(
             f"no viewer listens at {url}; start one with `rerun` (on a screen) or `rerun --serve-web` (for browsers)"
         )
-    return url
 
 
 @contextlib.contextmanager
@@ -80,14 +79,14 @@ def open_recording(
     rr.set_strict_mode(True)  # a call that cannot be logged is an error, not a warning
     recording = rr.RecordingStream(APPLICATION)
     with contextlib.ExitStack() as stack:
-        outputs: list[rr.GrpcSink | rr.FileSink] = [rr.GrpcSink(url) for url in sinks.viewers]
+        outputs: list[rr.GrpcSink | rr.FileSink] = [rr.GrpcSink(sinks.viewer)] if sinks.viewer else []
         file = None
         if sinks.rrd is not None:
             file = stack.enter_context(atomic_path(Path(sinks.rrd)))
             outputs.append(rr.FileSink(str(file)))
         if outputs:
             recording.set_sinks(*outputs, default_blueprint=blueprint)
-        if sinks.viewers:  # an earlier recording's layout would stay otherwise
+        if sinks.viewer:  # an earlier recording's layout would stay otherwise
             recording.send_blueprint(blueprint, make_active=True)
         recording.send_recording_name(name)
         if properties:

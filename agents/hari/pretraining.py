@@ -37,8 +37,8 @@ from embodied.agents.hari.config import ExecutionConfig
 from embodied.agents.hari.networks import EncodedDescriptions
 from embodied.agents.hari.words import collate, padded, percept
 from embodied.assistants.descriptions import Describer, dropped
-from embodied.assistants.hari import LONGEST_SUBGOAL, described_subgoal
 from embodied.interface import Description, Episode, FindObject, Move, Place, Pose, Task
+from embodied.kinds.shipped.hari import LONGEST_SUBGOAL, described_subgoal
 from embodied.records import Identity
 from embodied.seeds import stream
 from embodied.teachers.shortest import shortest_action

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from embodied.cli.common import Furnished, Printed, bar, catalogue_of, check_machine, fetch, note, show
-from embodied.cli.recording import Filmed, Viewers, film, viewers_of
+from embodied.cli.rollout import Filmed, Viewers, check_viewer, film
 from embodied.options import CubeFace, Option, OutputFolder, OutputRrd, drawn_as, whole
 from embodied.render.pictures import DRAWN
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from embodied.interface import Episode, Route
     from embodied.navigation.graph import NavGraph
     from embodied.viz.recording import Recognise
+    from embodied.viz.sinks import Sinks
     from embodied.world import World
 
 DOOR_FRAMES, DOOR_SIZE, DOOR_FROM = 36, (360, 480), (1.5, 4.0)
@@ -56,12 +57,8 @@ def run(args: DemoOptions) -> None:
     check_machine("fast" if args.small else args.pictures)
     if args.small:
         show_a_room(args)
-    else:
-        demonstrate(args, viewers_of(args))
-
-
-def demonstrate(args: DemoOptions, viewers: tuple[str, ...]) -> None:
-    """The whole line; both episodes also go to `viewers`."""
+        return
+    check_viewer(args)
     from embodied.generate import generate_house
     from embodied.house.floor_plan import save_plan
 
@@ -81,9 +78,9 @@ def demonstrate(args: DemoOptions, viewers: tuple[str, ...]) -> None:
         with timed("light and panoramas", seconds):
             world.render_all(progress=True)
         with timed("the first task: find something", seconds):
-            walk = find_something(args, world, viewers)
+            walk = find_something(args, world)
         with timed("the second task: ask for help", seconds):
-            help_facts = ask_for_help(args, world, routes, viewers)
+            help_facts = ask_for_help(args, world, routes)
         with timed("a door closes and opens", seconds):
             door = film_a_door(args.out / "door.mp4", world)
         facts: dict[str, object] = {"walk": walk, "help": help_facts, "plan": str(args.out / "plan.png")}
@@ -141,7 +138,7 @@ def inhabited(house: House, catalogue: Catalogue, args: DemoOptions) -> tuple[Ho
         return house, graph, worded(world, paths, WORDINGS["test"], seed=args.seed, language=People())
 
 
-def find_something(args: DemoOptions, world: World, viewers: tuple[str, ...]) -> dict:
+def find_something(args: DemoOptions, world: World) -> dict:
     """The shortest-path agent walks to an object; recorded to episode.rrd."""
     from embodied.evaluation.evaluate import play
     from embodied.kinds.shipped.find import FIND
@@ -149,14 +146,15 @@ def find_something(args: DemoOptions, world: World, viewers: tuple[str, ...]) ->
     from embodied.language import People
     from embodied.policies.baselines import Shortest
     from embodied.tasks.goals import find_pool, find_task
+    from embodied.viz.sinks import Sinks
 
     task = find_task(find_pool(world, seed=args.seed), args.task, seed=args.seed, language=People())
     make = FIND.environments(EnvInputs({world.name: world}))
     episode = play(make, Shortest(), [task], seed=args.seed, agent="shortest path")[0]
-    return recorded(world, episode, args.rrd or args.out / "episode.rrd", viewers)
+    return recorded(world, episode, Sinks(args.rrd or args.out / "episode.rrd", args.connect))
 
 
-def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route], viewers: tuple[str, ...]) -> dict:
+def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route]) -> dict:
     """The trained agent, seeing the world's own pictures, does a HANNA task in a house it has never seen; recorded to
     help.rrd."""
     from embodied.agents.common.shipped import SHIPPED_AGENT
@@ -170,6 +168,7 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route], viewe
     from embodied.kinds.shipped.hanna import HANNA, hanna_pool, hanna_task
     from embodied.kinds.task_kind import EnvInputs
     from embodied.language import People
+    from embodied.viz.sinks import Sinks
 
     agent, encoder = HannaAgent.load(SHIPPED_AGENT), load_encoder()
     nodes = bar(range(len(world.graph.ids)), "what the agent sees", "node")
@@ -182,14 +181,14 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route], viewe
     if args.video:
         film(world, episode, args.video, args.video_size)
     recognise = Detector.load(encoder).recognise
-    return recorded(world, episode, args.out / "help.rrd", viewers, eyes=world, recognise=recognise)
+    return recorded(world, episode, Sinks(args.out / "help.rrd", args.connect), eyes=world, recognise=recognise)
 
 
 def film_a_door(path: Path, world: World) -> Path | None:
     """Film how the door that is seen best from a viewpoint closes and opens again; None where no door is seen."""
     import numpy as np
 
-    from embodied.cli.recording import VIDEO_ANGLE
+    from embodied.cli.rollout import VIDEO_ANGLE
     from embodied.house.moment import Moment
     from embodied.viz.video import write_video
 
@@ -217,15 +216,9 @@ def film_a_door(path: Path, world: World) -> Path | None:
 
 
 def recorded(
-    world: World,
-    episode: Episode,
-    path: Path,
-    viewers: tuple[str, ...],
-    *,
-    eyes: World | None = None,
-    recognise: Recognise | None = None,
+    world: World, episode: Episode, sinks: Sinks, *, eyes: World | None = None, recognise: Recognise | None = None
 ) -> dict:
-    """Record an episode into the file `path` and to `viewers`; what is worth telling about it.
+    """Record an episode; what is worth telling about it.
 
     Args:
       eyes: the world whose panoramas the agent looked at; None where it looks at none.
@@ -233,10 +226,10 @@ def recorded(
     """
     from embodied.kinds.metrics import navigation_error, spl, success
     from embodied.viz.recording import record_episode
-    from embodied.viz.sinks import Sinks
 
+    assert sinks.rrd is not None, "a file is always written"
     watch = lambda steps: bar(steps, "recording", "step")
-    record_episode(world, episode, Sinks(path, viewers), eyes=eyes, watch=watch, recognise=recognise)
+    record_episode(world, episode, sinks, eyes=eyes, watch=watch, recognise=recognise)
     return {
         "agent": episode.agent,
         "request": episode.task.request,
@@ -245,8 +238,8 @@ def recorded(
         "navigation_error_m": round(navigation_error(episode, world.graph), 2),
         "steps": len(episode.steps),
         "requests": episode.requests,
-        "recording": str(path),
-        "recording_mib": round(path.stat().st_size / 2**20, 1),
+        "recording": str(sinks.rrd),
+        "recording_mib": round(sinks.rrd.stat().st_size / 2**20, 1),
     }
 
 

@@ -10,14 +10,64 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from embodied.cli.common import Furnished, Printed, bar, catalogue_of, check_machine, fetch, show
-from embodied.cli.recording import Filmed, Viewers, film, viewers_of
-from embodied.options import Count, CubeFace, HouseFolder, Option, drawn_as
+from embodied.cli.common import Furnished, Printed, bar, catalogue_of, check_machine, fetch, note, show
+from embodied.options import Count, CubeFace, HouseFolder, Option, OutputRrd, drawn_as, file_ending_in, video_side
 from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import DRAWN, parse_pictures
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from embodied.interface import Episode
+    from embodied.render.photograph import PhotoCamera
     from embodied.world import World
+
+
+Side = Annotated[int, Option(video_side, "PIXELS")]
+VIDEO_ANGLE = 1.2
+"""Vertical field of view of videos, radians."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Viewers:
+    """Recording."""
+
+    rrd: OutputRrd | None = None
+    """Write the Rerun recording here."""
+    connect: Annotated[str | None, Option(metavar="URL")] = None
+    """Send to a running viewer, which `rerun` or, for browsers, `rerun --serve-web` starts, e.g.
+    rerun+http://127.0.0.1:9876/proxy."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Filmed:
+    video: Annotated[Path | None, Option(file_ending_in(".mp4"), "MP4")] = None
+    """Write what the agent sees and what is said as a video."""
+    video_size: tuple[Side, Side] = (480, 640)
+    """Height and width of the video in pixels, both even."""
+
+
+def check_viewer(args: Viewers) -> None:
+    """Refuse a viewer that is not there, before the work begins."""
+    if args.connect is not None:
+        from embodied.viz.sinks import check_connected
+
+        check_connected(args.connect)
+
+
+def film(world: World, episode: Episode, path: Path, size: tuple[int, int], camera: PhotoCamera | None = None) -> Path:
+    """Write what the agent saw as a video with smooth motion and the dialogue; returns the path."""
+    from embodied.viz.video import film_episode
+
+    def frame(number: int, c: np.ndarray) -> np.ndarray:
+        rgb = world.renderer.view(c[:3], c[3], c[4], VIDEO_ANGLE, size).rgb
+        if camera is None or not camera.traits:
+            return rgb
+        return camera.photographed(rgb, VIDEO_ANGLE, "frame", number, light=world.darkness(c[:3]))
+
+    frames = film_episode(world.graph, episode, frame, path, size, lambda track: bar(track, "video", "frame"))
+    note(f"{path}: {frames} frames")
+    return path
 
 
 AGENTS = ("shortest", "random", "forward10")
@@ -43,12 +93,6 @@ class RolloutOptions(Filmed, Viewers, Furnished, Printed):
 
 
 def run(args: RolloutOptions) -> None:
-    check_machine("unlit" if args.house else args.pictures)  # a house may be lit already
-    roll_out(args, viewers_of(args))
-
-
-def roll_out(args: RolloutOptions, viewers: tuple[str, ...]) -> None:
-    """Play, film and record; recordings also go to `viewers`."""
     from embodied.envs.base import HelpEnv
     from embodied.evaluation.evaluate import play
     from embodied.kinds.metrics import PER_EPISODE
@@ -59,6 +103,8 @@ def roll_out(args: RolloutOptions, viewers: tuple[str, ...]) -> None:
     from embodied.viz.recording import PictureSizes, record_episode
     from embodied.viz.sinks import Sinks
 
+    check_machine("unlit" if args.house else args.pictures)  # a house may be lit already
+    check_viewer(args)
     camera = PhotoCamera(args.camera, args.seed)
     with world_of(args) as world:
         fetch(world.catalogue, world.house)
@@ -77,11 +123,11 @@ def roll_out(args: RolloutOptions, viewers: tuple[str, ...]) -> None:
             if args.video:
                 path = numbered(args.video, number, args.episodes)
                 row["video"] = str(film(world, episode, path, args.video_size, camera))
-            if args.rrd or viewers:
-                rrd = numbered(args.rrd, number, args.episodes) if args.rrd else None
+            if args.rrd or args.connect:
+                sinks = Sinks(args.rrd and numbered(args.rrd, number, args.episodes), args.connect)
                 watch = lambda steps: bar(steps, "recording", "step")
-                record_episode(world, episode, Sinks(rrd, viewers), pictures=PictureSizes(camera=camera), watch=watch)
-                row["recording"] = str(rrd or ", ".join(viewers))
+                record_episode(world, episode, sinks, pictures=PictureSizes(camera=camera), watch=watch)
+                row["recording"] = str(sinks.rrd or args.connect)
             rows.append(row)
         facts = {"agent": args.agent, "seed": args.seed, "world": world.name, "renderer": world.fingerprint}
         facts |= {"camera": args.camera, "episodes": rows}

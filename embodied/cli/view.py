@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from embodied.cli.common import Furnished, Printed, bar, catalogue_of, note, show
-from embodied.cli.recording import Filmed, Viewers, film, viewers_of
+from embodied.cli.rollout import Filmed, Viewers, check_viewer, film
 from embodied.cli.vqa import look
 from embodied.options import InputFolder, Option, OutputRrd, any_path, drawn_as, whole
 from embodied.render.pictures import DRAWN
@@ -69,7 +69,8 @@ def record_one(args: ViewOptions, episodes: Sequence[Listed], number: int) -> No
             "--episode needs --data DIR, the data set that the run was made on: its houses are drawn again"
         )
     episode, file = episodes[number].episode, args.rrd or args.folder / "recordings" / f"{number}.rrd"
-    sinks, catalogue, data = Sinks(file, viewers_of(args)), catalogue_of(args), Dataset(args.data)
+    check_viewer(args)
+    sinks, catalogue, data = Sinks(file, args.connect), catalogue_of(args), Dataset(args.data)
     name = episode.task.world
     data.place_of(episode)
     seen = looked_at(args.folder, episode.agent, name)
