@@ -141,24 +141,17 @@ class Driver:
         Args:
           speed, turn: metres and radians per second, as far as the motors can.
         """
-        self.command(speed, turn)
-        rolled = Roll(0.0, (), False)
+        self._command(float(np.clip(speed, -FASTEST, FASTEST)), float(np.clip(turn, -TURNING, TURNING)))
+        metres, collisions, touched = 0.0, list[str](), False
         for _ in range(periods):
             before = self.position
             mujoco.mj_step(self.model, self.data, self.substeps)
-            rolled = self.noted(rolled, before, self.owners_met(self.data.contact.geom1, self.data.contact.geom2))
-        return rolled
-
-    def command(self, speed: float, turn: float) -> None:
-        """Set the motors, as far as they go."""
-        self._command(float(np.clip(speed, -FASTEST, FASTEST)), float(np.clip(turn, -TURNING, TURNING)))
-
-    def noted(self, rolled: Roll, before: np.ndarray, now: frozenset[str]) -> Roll:
-        """`rolled` after one more period that began at `before` (2,), at whose end the body touches `now`."""
-        metres, time = float(np.linalg.norm(self.position - before)), self.data.time
-        collisions = sorted(t for t in now if time - self._last_touch.get(t, -math.inf) > APART)
-        self._last_touch |= dict.fromkeys(now, time)
-        return Roll(rolled.metres + metres, (*rolled.collisions, *collisions), rolled.touched or bool(now))
+            now, time = self._owners_met(), self.data.time
+            metres += float(np.linalg.norm(self.position - before))
+            collisions += sorted(t for t in now if time - self._last_touch.get(t, -math.inf) > APART)
+            touched |= bool(now)
+            self._last_touch |= dict.fromkeys(now, time)
+        return Roll(metres, tuple(collisions), touched)
 
     @property
     def eye(self) -> tuple[np.ndarray, np.ndarray]:
@@ -176,15 +169,12 @@ class Driver:
         for motor, side in zip(self._motors, (-1.0, 1.0), strict=True):
             self.data.ctrl[motor] = (speed + side * turn * TRACK / 2) / WHEEL
 
-    def owners_met(self, geoms: np.ndarray, others: np.ndarray) -> frozenset[str]:
-        """Owners, floors apart, of what the body touches, by pairs of geoms in contact (n,)."""
-        touched = set()
-        for a, b in zip(geoms, others, strict=True):
-            if self._mine[a] != self._mine[b]:
-                owner = self._owners.get(self._names[b if self._mine[a] else a], "")
-                if not owner.endswith("/floor"):
-                    touched.add(owner)
-        return frozenset(touched)
+    def _owners_met(self) -> set[str]:
+        """Owners, floors apart, of what the body touches."""
+        contacts = zip(self.data.contact.geom1, self.data.contact.geom2, strict=True)
+        met = (b if self._mine[a] else a for a, b in contacts if self._mine[a] != self._mine[b])
+        owners = (self._owners.get(self._names[geom], "") for geom in met)
+        return {owner for owner in owners if not owner.endswith("/floor")}
 
 
 def house_arena(house: House, catalogue: Catalogue) -> tuple[composer.Arena, dict[str, str]]:

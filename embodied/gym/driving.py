@@ -15,7 +15,7 @@ import numpy as np
 from gymnasium import spaces
 
 from embodied.assistants.descriptions import word_number
-from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver, Roll
+from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver
 from embodied.geometry import wrap
 from embodied.gym.sensors import LARGE, PIXELS, check_live, live_pixels
 from embodied.gym.spaces import codes_of
@@ -188,33 +188,22 @@ class Driving:
         self._wide: DrivingWays | None = None
 
     def step(self, action: Sequence[float] | np.ndarray) -> Outcome:
-        """Hold a command: `settings.numbers` numbers from -1 to 1.
+        """Hold a command: `settings.numbers` numbers from -1 to 1. SPL is as (4.17), of metres (docs/sources.md, S125).
 
         Raises:
           ValueError: another number of numbers, or something that is none.
           RuntimeError: the episode is over.
         """
-        command = self.command(action)
-        return self.judged(command, self.driver.roll(FASTEST * command[0], TURNING * command[1], self.periods))
-
-    @property
-    def periods(self) -> int:
-        """Control periods that a command is held."""
-        return max(1, round(self.settings.control / CONTROL))
-
-    def command(self, action: Sequence[float] | np.ndarray) -> np.ndarray:
-        """(numbers,) an action that can be carried out, cut to -1 to 1; raises as `step`."""
         command = np.asarray(action, dtype=np.float64).reshape(-1)
         if len(command) != self.settings.numbers or not np.isfinite(command).all():
             raise ValueError(f"an action should be {self.settings.numbers} finite numbers from -1 to 1, got {action!r}")
         if self.ended is not None:
             raise RuntimeError(f"the episode is over ({self.ended}); reset before another step")
-        return np.clip(command, -1.0, 1.0)
-
-    def judged(self, command: np.ndarray, rolled: Roll) -> Outcome:
-        """Outcome of a command that moved the body so; SPL as (4.17), of metres (docs/sources.md, S125)."""
+        command = np.clip(command, -1.0, 1.0)
+        periods = max(1, round(self.settings.control / CONTROL))
+        rolled = self.driver.roll(FASTEST * command[0], TURNING * command[1], periods)
         self.metres += rolled.metres
-        self.seconds += self.periods * CONTROL
+        self.seconds += periods * CONTROL
         self.collisions += rolled.collisions
         self.touched = rolled.touched
         before, self._left = self._left, self.left
@@ -266,18 +255,15 @@ class Driving:
     def look(self) -> dict[str, np.ndarray]:
         """The observation: pixels, motion, touch and goal."""
         s = self.settings
-        return {**live_pixels(self.seen, self.camera(), (s.height, s.width), s.observations), **self.proprioception()}
+        motion, touched = np.array(self.driver.motion, np.float32), np.array([self.touched], np.float32)
+        pixels = live_pixels(self.seen, self.camera(), (s.height, s.width), s.observations)
+        return {**pixels, "motion": motion, "touched": touched, **self.task.observation(self)}
 
     @property
     def seen(self) -> World:
         """The house with the doors that were pushed, to a tenth."""
         driver = self.driver
         return self.world.with_doors({d: round(x, 1) for d, x in openness(driver.model, driver.data).items()})
-
-    def proprioception(self) -> dict[str, np.ndarray]:
-        """The observation without pixels."""
-        motion, touched = np.array(self.driver.motion, np.float32), np.array([self.touched], np.float32)
-        return {"motion": motion, "touched": touched, **self.task.observation(self)}
 
     def camera(self) -> Camera:
         """The body's eye as it is now, upright."""
