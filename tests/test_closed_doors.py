@@ -16,12 +16,12 @@ from embodied.house.moment import Moment
 from embodied.interface import Close, Episode, FindObject, FollowRoute, Move, Open, Pose, Stop, Task, viewpoint
 from embodied.kinds import metrics
 from embodied.kinds.task_kind import EnvInputs, kind_named
-from embodied.language.people_language import People
+from embodied.language import People
 from embodied.navigation.doors import place_named
 from embodied.navigation.graph import OPENING, behind_doors, build_graph
 from embodied.policies.listeners import ScriptedListener
 from embodied.records import from_json, to_json
-from embodied.tasks.doors import told_of_doors
+from embodied.tasks.goals import told_of_doors
 from embodied.world import World
 
 HOUSE = furnished(two_rooms())

@@ -35,9 +35,8 @@ from embodied.envs.continuous import (
     NavMeshCache,
     ShortestPathFollower,
 )
-from embodied.evaluation.continuous import judged
 from embodied.generate import HouseConfig
-from embodied.gym.continuous import ContinuousGymEnv, make, open_episodes, register_continuous
+from embodied.gym.continuous import ContinuousGymEnv, judged, make, open_episodes, register_continuous
 from embodied.gym.continuous_tasks.objectnav import OBJECTNAV
 from embodied.world import open_world
 

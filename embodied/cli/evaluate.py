@@ -151,7 +151,7 @@ class Evaluation:
         """The split with this assistant, these doors, this moment of asking and episodes of at most --steps."""
         from embodied.envs.base import DoorRule
         from embodied.evaluation.asking import late_env
-        from embodied.tasks.doors import with_closed_doors
+        from embodied.tasks.goals import with_closed_doors
 
         if steps := self.args.steps:
             tasks = tuple(dataclasses.replace(t, horizon=min(t.horizon, steps)) for t in split.tasks)

@@ -28,19 +28,20 @@ from embodied.envs.continuous import (
     CameraConfig,
     ContinuousEnv,
     ContinuousEpisode,
+    ContinuousTrajectory,
     HabitatAction,
     NavMeshCache,
     ShortestPathFollower,
     check_on_floor,
     odometry,
 )
-from embodied.evaluation.continuous import judged
 from embodied.geometry import wrap
 from embodied.gym.drive import VIEW, LiveEnv, data_worlds, flat_worlds
 from embodied.gym.registration import register_environment
 from embodied.gym.sensors import LARGE, check_live, live_pixels, pixel_spaces
 from embodied.gym.spaces import codes_of, whole
 from embodied.gym.vector_env import in_step
+from embodied.kinds.metrics import warping
 from embodied.kinds.plugins import record_named, titled_files
 from embodied.render.camera import camera_at
 from embodied.render.pictures import PictureSettings
@@ -138,8 +139,7 @@ class ContinuousGymEnv(LiveEnv):
 
     Reward: 1 on success, minus 0.01 an action, plus a tenth for every metre nearer to the goal along the floor. STOP
     terminates, the last action truncates. Every info has success, is_success and spl (zero before STOP),
-    distance_to_goal, collided and steps_taken; the last one of an episode that ends by itself has every measure of
-    embodied.evaluation.continuous.
+    distance_to_goal, collided and steps_taken; the last one of an episode that ends by itself has what `judged` gives.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
@@ -323,3 +323,39 @@ def chosen(task: ContinuousTask, changes: Mapping[str, Any]) -> tuple[Body, Came
         raise ValueError(f"unknown options {unknown}; expected some of {sorted(names[0] | names[1])}")
     fields = [{k: v for k, v in changes.items() if k in n} for n in names]
     return dataclasses.replace(task.body, **fields[0]), dataclasses.replace(task.camera, **fields[1])
+
+
+WARPING = 3.0
+"""Metres that nDTW is normalised by (Magalhaes et al. 2019)."""
+
+
+def ndtw(trajectory: ContinuousTrajectory) -> float:
+    """exp(-DTW / (3 m |expert|)) of the positions after each action, without repeats; the episode needs a path."""
+    reference = expert_path(trajectory.episode)
+    after = trajectory.positions[1:] if len(trajectory.actions) else trajectory.positions
+    kept = np.concatenate([[True], (np.diff(after, axis=0) != 0).any(1)])
+    metres = np.linalg.norm(after[kept][:, None] - reference[None], axis=2)
+    return float(np.exp(-warping(metres) / (len(reference) * WARPING)))
+
+
+def judged(trajectory: ContinuousTrajectory) -> dict[str, float]:
+    """Every measure of one walk, by the names of VLN-CE's and ObjectNav's evaluators (Krantz et al. 2020; Anderson et al.
+    2018); nDTW and SDTW where its episode has a path.
+
+    Success is strictly nearer than the radius, after STOP. SPL and path length count straight lines between consecutive
+    positions, nDTW and SDTW straight lines between positions and the expert's (exact dynamic time warping, where the
+    published program may approximate it).
+    """
+    t, steps = trajectory, sum(a == HabitatAction.FORWARD for a in trajectory.actions)
+    numbers = {"success": t.success, "spl": t.spl}
+    if len(expert_path(t.episode)):
+        numbers |= {"ndtw": (alike := ndtw(t)), "sdtw": alike * t.success}
+    numbers |= {"oracle_success": t.oracle_success, "oracle_spl": t.oracle_spl}
+    numbers |= {"distance_to_goal": float(t.distances[-1]), "oracle_navigation_error": float(t.distances.min())}
+    numbers |= {"path_length": float(t.lengths[-1]), "steps_taken": float(len(t.actions))}
+    return {**numbers, "collisions": t.collisions / steps if steps else 0.0}  # of the steps ahead, those that touched
+
+
+def expert_path(episode: ContinuousEpisode) -> np.ndarray:
+    """(m, 3) metres that nDTW compares with; (0, 3) without."""
+    return np.array(episode.expert or episode.reference, float).reshape(-1, 3)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from embodied.house.house import House, Placement
-from embodied.interface import TURNS, FindObject, Language, Place, Pose, Task
+from embodied.interface import TURNS, FindObject, FollowRoute, Language, Place, Pose, SeenPlace, Task
+from embodied.navigation.doors import closable_doors
 from embodied.seeds import stream
 
 GOAT_REACH = 2.0
@@ -197,3 +199,23 @@ def draw(pool: Pool, index: int, *, seed: int, kind: str) -> tuple[GoalClass, Po
     c, node = (int(x) for x in pool.pairs[index])
     rng = stream(seed, "task", kind, pool.world, index)
     return pool.classes[c], Pose(node, int(rng.integers(TURNS))), rng
+
+
+def with_closed_doors(task: Task, place: Place, share: float, *, seed: int) -> Task:
+    """The task, of any kind, with doors closed at its start.
+
+    Args:
+      share: probability of each door that can be closed, 0 to 1. One in whose way a viewpoint stands cannot.
+      seed: the doors of a task depend on it and on the task's id; those of a smaller share are among those of a larger.
+    """
+    doors = closable_doors(place.house, place.graph)
+    drawn = stream(seed, "closed doors", task.id).random(len(doors))
+    return dataclasses.replace(task, closed=tuple(d for d, x in zip(doors, drawn, strict=True) if x < share))
+
+
+def told_of_doors(task: Task, place: SeenPlace, language: Language[SeenPlace], *, seed: int) -> Task:
+    """A task of following a route in new words, which say where to open a door that is closed at the start."""
+    assert isinstance(task.goal, FollowRoute), "others say no way"
+    rng = stream(seed, "words for closed doors", task.id)
+    now = place.with_doors(dict.fromkeys(task.closed, 0.0))
+    return dataclasses.replace(task, request=language.route(now, task.goal.path, task.start.yaw, rng=rng))

@@ -10,8 +10,7 @@ from embodied.kinds import task_kind
 from embodied.kinds.metrics import success
 from embodied.navigation.graph import NavGraph, behind_doors
 from embodied.policies.doors import NeverOpens, Wanderer
-from embodied.tasks.doors import with_closed_doors
-from embodied.tasks.goals import FindConfig, find_pool, find_task
+from embodied.tasks.goals import FindConfig, find_pool, find_task, with_closed_doors
 
 SHARE = 0.5
 """Share of the doors that are closed at the start."""
