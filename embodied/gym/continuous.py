@@ -339,8 +339,8 @@ def ndtw(trajectory: ContinuousTrajectory) -> float:
 
 
 def judged(trajectory: ContinuousTrajectory) -> dict[str, float]:
-    """Every measure of one walk, by the names of VLN-CE's and ObjectNav's evaluators (Krantz et al. 2020; Anderson et al.
-    2018); nDTW and SDTW where its episode has a path.
+    """Every measure of one walk by the names of VLN-CE's and ObjectNav's evaluators (Krantz et al. 2020, Anderson et
+    al. 2018); nDTW and SDTW where its episode has a path.
 
     Success is strictly nearer than the radius, after STOP. SPL and path length count straight lines between consecutive
     positions, nDTW and SDTW straight lines between positions and the expert's (exact dynamic time warping, where the
