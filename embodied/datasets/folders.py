@@ -127,16 +127,17 @@ def readme(program: str, data: Dataset, with_features: bool) -> str:
     return filled(program, data, FEATURES=note, BATCH=str(largest_batch(data))).rstrip()
 
 
-def filled(name: str, data: Dataset, **facts: str) -> str:
-    """A text of readmes/, with what is said of a data set, and other `facts`, where it names them: $SEED$."""
+def filled(name: str, data: Dataset | None, **facts: str) -> str:
+    """A text of readmes/, with what is said of a data set, if any, and other `facts`, where it names them: $SEED$."""
     text = (Path(__file__).parent / "readmes" / f"{name}.md").read_text(encoding="utf-8")
-    known = {
-        "KIND": data.kind,
-        "SEED": str(data.config.seed),
-        "DIGEST": data.digest[:16],
-        "TABLE": data.table().strip(),
-    }
-    return re.sub(r"\$([A-Z]+)\$", lambda m: (known | facts)[m.group(1)], text)
+    if data is not None:
+        facts |= {
+            "KIND": data.kind,
+            "SEED": str(data.config.seed),
+            "DIGEST": data.digest[:16],
+            "TABLE": data.table().strip(),
+        }
+    return re.sub(r"\$([A-Z]+)\$", lambda m: facts[m.group(1)], text)
 
 
 def largest_batch(data: Dataset) -> int:

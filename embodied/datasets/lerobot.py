@@ -32,6 +32,7 @@ import pyarrow.parquet as pq
 from embodied.assets.cache import drafts, sweep, write_bytes, write_json
 from embodied.assistants.descriptions import described
 from embodied.datasets.checks import DatasetError
+from embodied.datasets.folders import filled
 from embodied.geometry import wrap
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Place, Pose, Step, Stop
 from embodied.render.panorama import Panorama
@@ -125,7 +126,7 @@ def export_lerobot(
         for episode in episodes:
             place = data.place_of(episode)
             _add(writer, episode, place, _pictures(data, episode.task.world), succeeded)
-        return writer.finish(f"embodied {data.kind}", _card(data))
+        return writer.finish(f"embodied {data.kind}", "lerobot", data)
 
 
 @contextlib.contextmanager
@@ -311,12 +312,12 @@ class Writer:
         self._said += replies
         self._steps += n
 
-    def finish(self, robot: str, card: str) -> int:
+    def finish(self, robot: str, card: str, data: Dataset | None = None) -> int:
         """Everything but the videos; returns the number of steps.
 
         Args:
           robot: who moves.
-          card: what README.md says of the episodes.
+          card: name of the text of README.md in readmes/, of which some speak of `data`.
         """
         if not self._episodes:
             raise ValueError("there are no episodes to write; give files that hold some")
@@ -335,7 +336,7 @@ class Writer:
         )
         write_json(self._folder / "meta" / "info.json", self._info(robot), indent=1)
         counted = f"{len(self._episodes)} episodes ({self._steps} steps)"
-        write_bytes(self._folder / "README.md", (HEAD + card.replace("$COUNT$", counted)).encode())
+        write_bytes(self._folder / "README.md", filled(card, data, COUNT=counted).encode())
         return self._steps
 
     def _info(self, robot: str) -> dict[str, Any]:
@@ -513,30 +514,3 @@ def _statistics_of_counts(shown: np.ndarray, frames: int, depth: bool) -> dict[s
     numbers = {"min": at(1e-12), "max": values[last], "mean": mean, "std": deviation}
     numbers |= {name: at(q) for name, q in QUANTILES.items()}
     return {**{name: v.reshape(-1, 1, 1).tolist() for name, v in numbers.items()}, "count": [frames]}
-
-
-HEAD = """---
-license: apache-2.0
-task_categories:
-- robotics
-tags:
-- LeRobot
-configs:
-- config_name: default
-  data_files: data/*/*.parquet
----
-
-"""
-
-
-def _card(data: Dataset) -> str:
-    return f"""$COUNT$ of agents in generated, lit houses: {data.kind} tasks of the data set
-{data.digest[:16]} (seed {data.config.seed}), written by `embodied export lerobot`.
-
-LeRobotDataset {VERSION}, {FPS} frames a "second": a frame is what the agent sees before a step
-(`{CAMERA}`), `observation.state` its pose ({", ".join(STATE)}; metres and
-radians, z up), `action` how the pose changes in its own frame
-({", ".join(ACTION)}), `candidates` where it can go in that frame
-(metres, zero behind the last), `candidate` which of them it chose, the task of a frame the instruction that
-it hears at that moment, `{EVENTS}` what an assistant answers then. `meta/episodes` says which task, house and agent.
-"""

@@ -39,11 +39,6 @@ FORMATS = ("vlnce", "lerobot-vlnce")
 SQUARE = CameraConfig()
 STEPS = 4
 """Steps a second of LeRobot's data."""
-CARD = """$COUNT$ of continuous walks in generated, lit houses, written by `embodied export lerobot-vlnce`.
-
-`observation.image` is what is seen before an action, `observation.state` the way since the start, `action` scores stop,
-forward, left, right: 1 for what an expert does there. `lerobot-eval` judges policies in embodied.gym.lerobot.
-"""
 
 Chosen = Callable[[int], int]
 """From what the expert does to what is done."""
@@ -177,4 +172,4 @@ def _lerobot(folder: Path, walks: Iterable[Taught], camera: CameraConfig, with_d
             "embodied/agent": "expert",
         }
         writer.add(rows, rgb, depth, [trajectory.episode.instruction] * n, [""] * n, trajectory.success > 0, facts)
-    return writer.finish("embodied vlnce", CARD)
+    return writer.finish("embodied vlnce", "lerobot_vlnce")

@@ -29,11 +29,6 @@ DRIVES: Columns = {
 }
 HELD = 5
 """Commands that a random one is held for."""
-CARD = """$COUNT$ of drives in generated houses, written by `embodied export lerobot-drive`.
-
-`observation.image` is what is seen before a command, `observation.state` the motion, touch and the direction of the
-goal, `action` what an expert commands there. `lerobot-eval` judges policies in embodied.gym.lerobot.
-"""
 
 
 def export_drives(
@@ -70,7 +65,7 @@ def export_drives(
             words = [env.task_description] * len(seen)
             replies = [""] * len(seen)
             writer.add(rows, [o["pixels"] for o in seen], [], words, replies, infos[-1]["is_success"], facts)
-        return writer.finish("embodied drive", CARD)
+        return writer.finish("embodied drive", "lerobot_drive")
 
 
 def _driven(
