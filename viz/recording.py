@@ -12,8 +12,10 @@ Entity tree (timeline 'step'):
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -155,36 +157,28 @@ def record_episode(
     seen = None if eyes is None else eyes.pictures
     layout = blueprint_of(world.house, episode, seen)
     with open_recording(sinks, layout, name=detokenized(episode.task.request), properties=about) as recording:
-        steps = watch(episode.steps)
-        for _ in record(
-            recording,
-            world,
-            episode.task,
-            steps,
-            eyes=eyes,
-            pictures=pictures,
-            budget=episode.budget,
-            recognise=recognise,
-        ):
+        how: dict[str, Any] = {"eyes": eyes, "pictures": pictures, "budget": episode.budget, "recognise": recognise}
+        for _ in record(recording, world, episode.task, watch(episode.steps), **how):
             pass
 
 
 def log_world(recording: rr.RecordingStream, world: World) -> None:
     """The house without ceilings, and its navigation graph, for all times."""
-    recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    keep = functools.partial(recording.log, static=True)
+    keep("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     hung = frozenset(p.id for p in world.house.placements if world.catalogue.assets[p.asset].support == "ceiling")
     log_house(recording, light_meshes(world.parts, hung) if world.lit is None else lit_meshes(world.lit, hung))
     floor = on_floor(world.graph.positions, HEIGHTS["node"])
-    recording.log("graph/nodes", rr.Points3D(floor, radii=0.06, colors=PALETTE["graph"]), static=True)
+    keep("graph/nodes", rr.Points3D(floor, radii=0.06, colors=PALETTE["graph"]))
     strips = floor[np.asarray(world.graph.edges)]
-    recording.log("graph/edges", rr.LineStrips3D(strips, radii=0.012, colors=(*PALETTE["graph"], 130)), static=True)
+    keep("graph/edges", rr.LineStrips3D(strips, radii=0.012, colors=(*PALETTE["graph"], 130)))
 
 
 def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
     """Request, goal and start, for all times."""
-    at = world.graph.positions
+    keep, at = functools.partial(recording.log, static=True), world.graph.positions
     goals = on_floor(at[list(task.goal_nodes)], HEIGHTS["mark"])
-    recording.log("task/goal", rr.Points3D(goals, radii=0.16, colors=PALETTE["goal"]), static=True)
+    keep("task/goal", rr.Points3D(goals, radii=0.16, colors=PALETTE["goal"]))
     sought = [
         world.house.placement_by_id[p] for p in getattr(task.goal, "placements", ()) if p in world.house.placement_by_id
     ]
@@ -197,33 +191,16 @@ def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
             colors=PALETTE["goal"],
             radii=0.012,
         )
-        recording.log("task/sought", boxes, static=True)
-    recording.log(
-        "task/start",
-        rr.Points3D(on_floor(at[task.start.node], HEIGHTS["mark"]), radii=0.13, colors=PALETTE["start"]),
-        static=True,
-    )
+        keep("task/sought", boxes)
+    start = on_floor(at[task.start.node], HEIGHTS["mark"])
+    keep("task/start", rr.Points3D(start, radii=0.13, colors=PALETTE["start"]))
     heading = "## " if len(task.request) <= SHORT else ""
-    recording.log("text/request", markdown(f"{heading}“{detokenized(task.request)}”"), static=True)
-    for name in ("goal", "target"):
-        recording.log(
-            f"plot/distance/{name}",
-            rr.SeriesLines(colors=PALETTE["route" if name == "target" else name], widths=2),
-            static=True,
-        )
-    people = [p for p in world.house.placements if p.object_class == "person"]
-    if people:
-        recording.log(
-            "people",
-            rr.Points3D(
-                [np.add(p.position, (0, 0, p.size[2] + 0.25)) for p in people],
-                radii=0.05,
-                colors=PALETTE["person"],
-                labels=["assistant"] * len(people),
-                show_labels=False,
-            ),
-            static=True,
-        )
+    keep("text/request", markdown(f"{heading}“{detokenized(task.request)}”"))
+    for name, colour in (("goal", "goal"), ("target", "route")):
+        keep(f"plot/distance/{name}", rr.SeriesLines(colors=PALETTE[colour], widths=2))
+    if people := [p for p in world.house.placements if p.object_class == "person"]:
+        above, labels = [np.add(p.position, (0, 0, p.size[2] + 0.25)) for p in people], ["assistant"] * len(people)
+        keep("people", rr.Points3D(above, radii=0.05, colors=PALETTE["person"], labels=labels, show_labels=False))
 
 
 def log_step(
@@ -294,12 +271,8 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
     recording.log("view/panorama", encoded(np.roll(equirect, shift, axis=1)))
     if views.recognise is not None:
         log_recognised(recording, views.recognise(panorama), pose, sizes.panorama)
-    recording.log(
-        "agent/body",
-        rr.Capsules3D(
-            lengths=1.0, radii=0.2, translations=[on_floor(eye, HEIGHTS["body"])], colors=(*PALETTE["agent"], 200)
-        ),
-    )
+    at, colour = [on_floor(eye, HEIGHTS["body"])], (*PALETTE["agent"], 200)
+    recording.log("agent/body", rr.Capsules3D(lengths=1.0, radii=0.2, translations=at, colors=colour))
 
 
 def log_recognised(recording: rr.RecordingStream, objects: Sequence[Recognised], pose: Pose, height: int) -> None:

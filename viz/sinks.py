@@ -142,24 +142,14 @@ def blueprint_of(house: House, episode: Episode, seen: PictureSettings | None = 
     around = "Around it, which it does not see" if monocular else "Panorama, gaze in the middle"
     panorama = rrb.Spatial2DView(origin="/view/panorama", name=around)
     sent = [rrb.Spatial2DView(origin="/view/target", name="Image of where to go")] if target else []
-    texts = [
-        rrb.TextDocumentView(origin="/text/request", name="Request"),
-        rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
-    ]
+    doing = rrb.TextDocumentView(origin="/text/instruction", name="Doing now")
+    texts = [rrb.TextDocumentView(origin="/text/request", name="Request"), doing]
     if stack:
-        texts = [
-            rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
-            rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first"),
-        ]
+        texts = [doing, rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first")]
     plots = _plots(thought, stack, budget=episode.budget is not None)
-    dialogue_view = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
-    right = rrb.Vertical(
-        rrb.Horizontal(ahead, *sent),
-        panorama,
-        rrb.Horizontal(*texts),
-        *([dialogue_view] if dialogue else []),
-        row_shares=[5, 3, 2, *([3] if dialogue else [])],
-    )
+    rows = [rrb.Horizontal(ahead, *sent), panorama, rrb.Horizontal(*texts)]
+    rows += [rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")] if dialogue else []
+    right = rrb.Vertical(*rows, row_shares=[5, 3, 2, 3][: len(rows)])
     body, *others = (TextLogColumn(kind, visible=kind == "Body") for kind in ("Body", "EntityPath", "LogLevel"))
     events = rrb.TextLogView(
         origin="/events", name="Events", columns=rrb.archetypes.TextLogColumns(text_log_columns=[body, *others])
@@ -193,23 +183,17 @@ def _house_view(house: House) -> rrb.Spatial3DView:
 
 def _plots(probabilities: bool, cost: bool, *, budget: bool) -> list[rrb.View]:
     """Distance and mode over time, how likely asking was, and what it has cost so far."""
+    series = rrb.TimeSeriesView
+    low, high = rrb.PlotLegend(rrb.Corner2D.LeftBottom), rrb.PlotLegend(rrb.Corner2D.LeftTop)
     plots: list[rrb.View] = [
-        rrb.TimeSeriesView(
-            origin="/plot/distance", name="Metres to go", plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom)
-        ),
+        series(origin="/plot/distance", name="Metres to go", plot_legend=low),
         rrb.StateTimelineView(origin="/mode", name="Mode"),
     ]
     if probabilities:
-        plots.append(
-            rrb.TimeSeriesView(
-                origin="/plot/probability",
-                name="Probability of asking",
-                axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
-                plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
-            )
-        )
+        axis, name = rrb.ScalarAxis(range=(0.0, 1.0)), "Probability of asking"
+        plots.append(series(origin="/plot/probability", name=name, axis_y=axis, plot_legend=high))
     if cost:
-        plots.append(rrb.TimeSeriesView(origin="/plot/cost", name="Cost so far"))
+        plots.append(series(origin="/plot/cost", name="Cost so far"))
     if budget:
-        plots.append(rrb.TimeSeriesView(origin="/plot/budget", name="Requests left"))
+        plots.append(series(origin="/plot/budget", name="Requests left"))
     return plots

@@ -141,17 +141,11 @@ def extras(_: DoctorOptions) -> Finding:
 
 
 def _installed(names: Sequence[str]) -> tuple[list[str], list[str]]:
-    installed: list[str] = []
-    missing: list[str] = []
+    versions: dict[str, str | None] = dict.fromkeys(names)
     for name in names:
-        version = None
         with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-            version = importlib.metadata.version(name)  # None: its metadata are lost
-        if version is None:
-            missing.append(name)
-        else:
-            installed.append(f"{name} {version}")
-    return installed, missing
+            versions[name] = importlib.metadata.version(name)  # None: its metadata are lost
+    return [f"{name} {v}" for name, v in versions.items() if v], [name for name, v in versions.items() if not v]
 
 
 def renderer(_: DoctorOptions) -> Finding:

@@ -131,12 +131,8 @@ def filled(name: str, data: Dataset | None, **facts: str) -> str:
     """A text of readmes/, with what is said of a data set, if any, and other `facts`, where it names them: $SEED$."""
     text = (Path(__file__).parent / "readmes" / f"{name}.md").read_text(encoding="utf-8")
     if data is not None:
-        facts |= {
-            "KIND": data.kind,
-            "SEED": str(data.config.seed),
-            "DIGEST": data.digest[:16],
-            "TABLE": data.table().strip(),
-        }
+        facts |= {"KIND": data.kind, "SEED": str(data.config.seed)}
+        facts |= {"DIGEST": data.digest[:16], "TABLE": data.table().strip()}
     return re.sub(r"\$([A-Z]+)\$", lambda m: facts[m.group(1)], text)
 
 
