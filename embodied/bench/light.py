@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import math
 import time
-import timeit
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from scipy.ndimage import gaussian_filter
 
 from embodied import gl
 from embodied.assets.cache import write_json
+from embodied.bench import timing
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.light.backend import device
@@ -77,9 +77,8 @@ def compare(
     for k in range(LIGHT_HOUSES):
         hour, weather = TIMES[k % len(TIMES)]
         house = generate_house(seed + k, HouseConfig(area=FLAT_AREA, hour=hour, weather=weather), catalogue=catalogue)
-        progress(
-            f"house {seed + k} at {hour:g} h, {weather}: {len(house.rooms)} rooms, {len(house.placements)} objects"
-        )
+        counted = f"{len(house.rooms)} rooms, {len(house.placements)} objects"
+        progress(f"house {seed + k} at {hour:g} h, {weather}: {counted}")
         bakes = {quality: bake(house, catalogue, cache, quality) for quality in BAKES}
         chosen = viewpoints(house, kinds)
         kinds += [house.room_by_id[room].kind for room, _, _ in chosen]
@@ -123,17 +122,14 @@ def draw(
             lit = None if way == "unlit" else baked.get(way, best).lit
             overlay = gloss_of(best, detail=False) if way == "gloss" else None
             with Renderer(house, catalogue, lit=lit, overlay=overlay) as r:
-                shots += [_drawn(r, way, v, hour) for v in views]
+                for room, eye, yaw in views:
+                    face = functools.partial(r.rgb, camera_at(eye, yaw), (256, 256))
+                    rgb = r.view(eye, yaw, -0.1, VIEW_ANGLE, VIEW_SIZE).rgb
+                    shots.append(Shot(room, hour, way, rgb, timing.measure("", face, repeats=5).value))
         else:
             tracer = Tracer(best, house, quality=way, rays=16 if way == "glossy" else RAYS)
             shots += [_traced(tracer, way, v, hour) for v in views]
     return shots
-
-
-def _drawn(r: Renderer, way: str, view: tuple[str, np.ndarray, float], hour: float) -> Shot:
-    room, eye, yaw = view
-    rgb = r.view(eye, yaw, -0.1, VIEW_ANGLE, VIEW_SIZE).rgb
-    return Shot(room, hour, way, rgb, _median_ms(functools.partial(r.rgb, camera_at(eye, yaw), (256, 256))))
 
 
 def _traced(t: Tracer, way: str, view: tuple[str, np.ndarray, float], hour: float) -> Shot:
@@ -159,12 +155,10 @@ def measure(shots: Sequence[Shot]) -> dict:
     for way in WAYS:
         row: dict = {"way": way, "ms_256": float(np.median([by[*v, way].ms for v in views]))}
         for truth in ("reference", "diffuse"):
-            pairs = [
-                (by[*v, way].rgb, by[*v, truth].rgb, by[*v, "diffuse"].plain if truth == "diffuse" else None)
-                for v in views
-            ]
-            row[f"psnr_{truth}"] = None if way == truth else float(np.median([psnr(*p) for p in pairs]))
-            row[f"ssim_{truth}"] = None if way == truth else float(np.median([ssim(*p) for p in pairs]))
+            parts = [by[*v, "diffuse"].plain if truth == "diffuse" else None for v in views]
+            pairs = [(by[*v, way].rgb, by[*v, truth].rgb, part) for v, part in zip(views, parts, strict=True)]
+            for name, of in (("psnr", psnr), ("ssim", ssim)):
+                row[f"{name}_{truth}"] = None if way == truth else float(np.median([of(*p) for p in pairs]))
         shiny = [(v, ~plain) for v in views if (plain := by[*v, "diffuse"].plain) is not None]
         alone = [psnr(by[*v, way].rgb, by[*v, "reference"].rgb, m) for v, m in shiny if m.mean() >= SHOWN]
         row["psnr_shiny"] = None if way == "reference" or not alone else float(np.median(alone))
@@ -184,10 +178,8 @@ def table(facts: dict) -> str:
             f"{number(r[f'psnr_{t}'], '.1f')} / {number(r[f'ssim_{t}'], '.3f')}" for t in ("reference", "diffuse")
         )
         lines.append(f"| {r['way']} | {r['ms_256']:.0f} | {whole} | {number(r['psnr_shiny'], '.1f')} | {diffuse} |")
-    views = len(facts["views"])
-    return "\n".join(
-        [*lines, f"\nMedians of {views} views of one run; {facts['renderer']}, light by {facts['device']}."]
-    )
+    about = f"{facts['renderer']}, light by {facts['device']}."
+    return "\n".join([*lines, f"\nMedians of {len(facts['views'])} views of one run; {about}"])
 
 
 def psnr(a: np.ndarray, b: np.ndarray, where: np.ndarray | None = None) -> float:
@@ -210,8 +202,3 @@ def ssim(a: np.ndarray, b: np.ndarray, where: np.ndarray | None = None) -> float
     c1, c2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
     alike = (2 * ma * mb + c1) * (2 * cov + c2) / ((ma**2 + mb**2 + c1) * (va + vb + c2))
     return float(np.mean(alike if where is None else alike[where]))
-
-
-def _median_ms(draw_: Callable[[], object]) -> float:
-    draw_()
-    return 1e3 * float(np.median(timeit.repeat(draw_, repeat=5, number=1)))

@@ -131,9 +131,8 @@ def staged(catalogue: WithRobot, seed: int, k: int) -> Staged:
     assert person is not None  # some floor is free in every house
     house = dataclasses.replace(house, placements=(*house.placements, person))
     support = {key: a.support for key, a in catalogue.catalogue.assets.items()}
-    furniture = [
-        p for p in house.placements if support[p.asset] in MOVABLE and min(p.size) > 0.25 and max(p.size[:2]) < 1.3
-    ]
+    fits = lambda size: min(size) > 0.25 and max(size[:2]) < 1.3
+    furniture = [p for p in house.placements if support[p.asset] in MOVABLE and fits(p.size)]
     robot = Placement(BENCH_ROBOT, BENCH_ROBOT, BENCH_ROBOT, "", (0, 0, 0), 0.0, (0.6, 0.5, 1.4))
     placed: list[Placement] = []
     for p in (person, robot, *(furniture[i] for i in rng.permutation(len(furniture)))):
@@ -210,9 +209,8 @@ def _seen(
     middle = (points.min(0) + points.max(0)) / 2
     numbers = [i + 1 for i, o in enumerate(renderer.owners) if o in {p.owner for p in parts}]
     eyes = sorted(s.graph.positions, key=lambda e: abs(math.dist(e[:2], middle[:2]) - LOOKED_FROM))[:8]
-    views = [
-        (e, math.atan2(*(middle - e)[1::-1]), math.atan2(middle[2] - e[2], math.dist(e[:2], middle[:2]))) for e in eyes
-    ]
+    pitch_from = lambda e: math.atan2(middle[2] - e[2], math.dist(e[:2], middle[:2]))
+    views = [(e, math.atan2(*(middle - e)[1::-1]), pitch_from(e)) for e in eyes]
     static = [renderer.view(*v, VIEW_ANGLE, MOVER_SIZE) for v in views]
     best = int(np.argmax([np.isin(v.ids, numbers).sum() for v in static]))
     eye, yaw, pitch = views[best]

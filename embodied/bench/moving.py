@@ -75,10 +75,7 @@ def judged(s: Staged, catalogue: WithRobot, cache: Path, known: Mapping[str, np.
         view, owners = views["moving"][name]
         numbers = [i + 1 for i, o in enumerate(owners) if o.partition("/")[0] in own]
         floors = [i + 1 for i, o in enumerate(owners) if o.endswith("/floor")]
-        masks = {
-            "mover": fact["mover"] & np.isin(view.ids, numbers),
-            "floor": fact["floor"] & np.isin(view.ids, floors),
-        }
+        masks = {key: fact[key] & np.isin(view.ids, own) for key, own in (("mover", numbers), ("floor", floors))}
         masks = {key: cv2.erode(m.astype(np.uint8), np.ones((3, 3))) > 0 for key, m in masks.items()}
         row: dict = {"house": s.house.seed, "hour": s.house.sky.hour, "name": name, "kind": kind}
         for key, mask in masks.items():

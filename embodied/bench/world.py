@@ -34,12 +34,8 @@ LARGE_HOUSE = HouseConfig(area=(400.0, 440.0))
 def houses(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
     """Layout and furnishing of a 125-node house."""
     seeds = iter(range(seed, seed + 10_000))
-    yield measure(
-        "layout and furnishing, 125-node house",
-        lambda: generate_house(next(seeds), LARGE_HOUSE, catalogue),
-        "s",
-        repeats=7,
-    )
+    make = lambda: generate_house(next(seeds), LARGE_HOUSE, catalogue)
+    yield measure("layout and furnishing, 125-node house", make, "s", repeats=7)
     house = generate_house(seed, LARGE_HOUSE, catalogue)
     yield measure("to a ready MjModel, assets cached", lambda: compile_scene(house, catalogue), "s", repeats=5)
 
@@ -52,18 +48,10 @@ def pictures(catalogue: Catalogue, cache: Path, seed: int, kind: str) -> Iterato
         nodes = np.linspace(0, len(eyes) - 1, 12).astype(int)
         cameras = [c for n in nodes for c in face_cameras(eyes[n])]
         yield _face(renderer, cameras, kind)
-        yield measure(
-            f"256 panorama, six faces of rgb, {kind}",
-            lambda: [[renderer.rgb(c, (256, 256)) for c in face_cameras(eyes[n])] for n in nodes],
-            per=len(nodes),
-            repeats=3,
-        )
-        yield measure(
-            f"256 panorama with depth and ids, {kind}",
-            lambda: [renderer.panorama(eyes[n]) for n in nodes],
-            per=len(nodes),
-            repeats=3,
-        )
+        of_nodes = functools.partial(measure, per=len(nodes), repeats=3)
+        faces = lambda: [[renderer.rgb(c, (256, 256)) for c in face_cameras(eyes[n])] for n in nodes]
+        yield of_nodes(f"256 panorama, six faces of rgb, {kind}", faces)
+        yield of_nodes(f"256 panorama with depth and ids, {kind}", lambda: [renderer.panorama(eyes[n]) for n in nodes])
         panorama = renderer.panorama(eyes[0])
         yield measure("36 views at 224 px from a panorama", lambda: panorama.views36(224), repeats=15)
     if kind != "unlit":
@@ -142,19 +130,11 @@ def plays(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
         house, graph = make_dataset_house(seed, "bench", HouseConfig(area=DatasetConfig(kind).area), catalogue)
         place = StoredPlace(house, graph)
         routes = build_routes(place, seed=seed, language=language, house_split="test") if known.routes else ()
-        tasks = known.tasks(TaskInputs(place, routes, seed, language), [(known.unseen_part, TASKS_PLAYED)])[
-            known.unseen_part
-        ]
+        (tasks,) = known.tasks(TaskInputs(place, routes, seed, language), [(known.unseen_part, TASKS_PLAYED)]).values()
         env = known.environments(EnvInputs({"bench": place}, {"bench": routes}.__getitem__))()
         counts = walk(env, tasks)
-        asked = counts[1] / counts[0]
-        yield measure(
-            f"{kind} steps, {100 * asked:.0f} % requests",
-            functools.partial(walk, env, tasks),
-            "1/s",
-            repeats=7,
-            per=counts[0],
-        )
+        name = f"{kind} steps, {100 * counts[1] / counts[0]:.0f} % requests"
+        yield measure(name, functools.partial(walk, env, tasks), "1/s", repeats=7, per=counts[0])
 
 
 def walk(env: HelpEnv, tasks: list[Task]) -> tuple[int, int]:
