@@ -214,10 +214,8 @@ class Driving:
             self.ended = "said" if self.task.says else "reached"
         elif self.seconds >= self.settings.seconds - 1e-9:
             self.ended = "limit"
-        trajectory = self.trajectory()
-        reward = (
-            trajectory.success - STEP_COST - COLLISION_COST * len(rolled.collisions) + PER_METRE * (before - self._left)
-        )
+        trajectory, price = self.trajectory(), STEP_COST + COLLISION_COST * len(rolled.collisions)
+        reward = trajectory.success - price + PER_METRE * (before - self._left)
         facts = {"success": trajectory.success, "spl": trajectory.spl}
         facts |= {"collisions": float(len(self.collisions)), "metres": self.metres, "seconds": self.seconds}
         return Outcome(reward, self.ended, {**facts, "distance_to_goal": self._left})

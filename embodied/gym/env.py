@@ -45,7 +45,7 @@ from embodied.gym.sensors import (
 from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
 from embodied.house.floor_plan import font, paint_plan
 from embodied.house.house import House
-from embodied.interface import FeatureSource, Observation, Place, Pose, SeenPlace, Task
+from embodied.interface import FeatureSource, Observation, Place, Pose, Task
 from embodied.kinds.metrics import PER_EPISODE
 from embodied.kinds.task_kind import kind_named
 from embodied.language.plain_language import detokenized
@@ -289,14 +289,8 @@ def picture(env: HelpEnv, o: Observation) -> np.ndarray:
     """The view along the agent's heading, the plan beside it, the words below."""
     nodes = [env.task.start.node, *(s.next_pose.node for s in env._steps)]
     view = _view(env.world, env.pose)
-    plan = paint_plan(
-        env.world.house,
-        pixels_per_metre=28,
-        graph=env.world.graph,
-        path=tuple(nodes),
-        facing=env.pose.yaw,
-        titles=False,
-    )
+    how: dict[str, Any] = {"path": tuple(nodes), "facing": env.pose.yaw, "titles": False}
+    plan = paint_plan(env.world.house, pixels_per_metre=28, graph=env.world.graph, **how)
     plan = ImageOps.pad(plan.convert("RGB"), PLAN[::-1], Image.Resampling.LANCZOS, "white")
     sheet = Image.new("RGB", (view.width + plan.width, VIEW[0] + WORDS_HEIGHT), "white")
     sheet.paste(view, (0, 0))
@@ -374,27 +368,31 @@ def open_resources(kind: str, **settings: Any) -> SharedResources:
     wanted = EnvironmentSettings(**settings)
     checked_seed(wanted.seed)
     checked_observations(wanted.observations)
-    if wanted.data:
-        play = split_playground(kind, Path(wanted.data), wanted.split, wanted)
-    else:
-        play = flat_playground(kind, wanted.seed, wanted)
+    data = wanted.data and Path(wanted.data)
+    play = split_playground(kind, data, wanted.split, wanted) if data else flat_playground(kind, wanted.seed, wanted)
     layout = wanted.layout or SpaceLayout.of(kind_named(kind), wanted.rules)
     opened = () if wanted.worlds is not None else [w for w in play.worlds.values() if isinstance(w, World)]
     return SharedResources(play.make_env, play.tasks, _sensor_of(play, wanted), layout, opened)
 
 
 def _sensor_of(play: Playground, wanted: EnvironmentSettings) -> Sensor:
-    """Everything that is seen, over one store of decoded panoramas."""
+    """Everything that is seen, over one store of decoded panoramas.
+
+    Raises:
+      ValueError: pixels are asked of places that nobody can draw.
+    """
     sensors: list[Sensor] = []
     seen = wanted.seen
     drawn = {name: w for name, w in play.worlds.items() if isinstance(w, World)}
-    store = PanoramaStore(drawn)
-    if pixels := [name for name in PIXELS if name in seen]:
-        require_rendered(play.worlds, drawn)
+    store, pixels = PanoramaStore(drawn), [name for name in PIXELS if name in seen]
+    blind = sorted(set(play.worlds) - set(drawn))
+    if blind and (pixels or ("features" in seen and wanted.source is None)):
+        raise ValueError(
+            f"there are no pictures of {blind[:3]}: only an embodied.World can be seen; choose observations='oracle'"
+        )
+    if pixels:
         sensors.append(CameraSensor(store, pixels, wanted.view))
     if "features" in seen:
-        if wanted.source is None:
-            require_rendered(play.worlds, drawn)
         source = wanted.source if wanted.source is not None else encoder_entry().load()(store)
         sensors.append(FeatureSensor("features", source))
     if "oracle" in seen:
@@ -406,11 +404,3 @@ def _sensor_of(play: Playground, wanted: EnvironmentSettings) -> Sensor:
 def _oracle_of(worlds: Mapping[str, World], name: str) -> np.ndarray:
     world = place_named(worlds, name)
     return seen_features(world, world.catalogue, world.cache)
-
-
-def require_rendered(worlds: Mapping[str, SeenPlace], drawn: Mapping[str, World]) -> None:
-    """Raises ValueError where pixels are asked of places that nobody can draw."""
-    if blind := sorted(set(worlds) - set(drawn)):
-        raise ValueError(
-            f"there are no pictures of {blind[:3]}: only an embodied.World can be seen; choose observations='oracle'"
-        )

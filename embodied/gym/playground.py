@@ -90,10 +90,8 @@ def split_playground(kind: str, data: Path, split: str, settings: PlaygroundSett
     catalogue, whole = load_catalogue(settings.cached), Dataset(data)
     if whole.kind != kind:
         raise ValueError(f"{data} is a data set of {whole.kind!r}, not of {kind!r}")
-    if (rooms := settings.rooms) != whole.config.rooms:
-        raise ValueError(
-            f"{data} was built with rooms={whole.config.rooms}, not {rooms}; say so, or build another data set"
-        )
+    if (rooms := settings.rooms) != (built := whole.config.rooms):
+        raise ValueError(f"{data} was built with rooms={built}, not {rooms}; say so, or build another data set")
     worlds = settings.worlds
     if worlds is None:
         names = whole.names(split)
@@ -177,13 +175,10 @@ def _playground(
     settings: PlaygroundSettings,
     catalogue: Catalogue,
 ) -> Playground:
-    known, routes_of = kind_named(kind), lambda name: routes.get(name, ())
-    make_env = known.environments(
-        EnvInputs(worlds, routes_of, rules=settings.rules, assistant=assistant_of(settings.assistant))
-    )
-    return Playground(
-        worlds, known.tasks_under(tasks, worlds, settings.rules), make_env, _oracle(worlds, catalogue, settings)
-    )
+    known, routes_of, assistant = kind_named(kind), lambda name: routes.get(name, ()), assistant_of(settings.assistant)
+    make_env = known.environments(EnvInputs(worlds, routes_of, rules=settings.rules, assistant=assistant))
+    timed = known.tasks_under(tasks, worlds, settings.rules)
+    return Playground(worlds, timed, make_env, _oracle(worlds, catalogue, settings))
 
 
 def _oracle(
@@ -218,9 +213,8 @@ def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> Picture
 def seen_features(world: SeenPlace, catalogue: Catalogue, cache: Path) -> np.ndarray:
     """The semantic features of a world over all classes of the catalogue, kept in the cache."""
     classes = tuple(catalogue.classes)
-    code = code_digest(
-        *makers(Unlit()), "embodied.render.ray_casting", "embodied.render.sightings", "embodied.gym.semantic_features"
-    )
+    others = ("embodied.render.ray_casting", "embodied.render.sightings", "embodied.gym.semantic_features")
+    code = code_digest(*makers(Unlit()), *others)
     key = digest(world.house.digest, np.asarray(world.graph.positions).tolist(), classes, code)
     path = cache / "semantic" / f"{key[:32]}.npy"
     with contextlib.suppress(OSError, ValueError, EOFError):  # absent or damaged: made anew

@@ -234,9 +234,8 @@ class CameraSensor:
 
     def _arrays(self, o: Observation, panorama: Panorama, target: Panorama | None) -> Arrays:
         at, yaw, pitch = viewpoint(o.sight), o.turn * STEP, o.tilt * STEP
-        arrays = {
-            name: framed(panorama, self._view, name, yaw, pitch, place=(at.world, at.node)) for name in self._channels
-        }
+        look = functools.partial(framed, panorama, self._view, yaw=yaw, pitch=pitch, place=(at.world, at.node))
+        arrays = {name: look(name) for name in self._channels}
         if "rgb" in self._channels:
             arrays["target_rgb"] = self._target(o.target, target)
         return arrays

@@ -9,6 +9,7 @@ write straight into the batch. For several processes, use Gymnasium's AsyncVecto
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
@@ -52,11 +53,8 @@ def make_vec(
     threads = options.pop("threads", None)
     shared = open_resources(kind, **options)
 
-    def one() -> HelpGymEnv:
-        return HelpGymEnv(
-            shared.make_env, shared.tasks, SensorSuite(), layout=shared.layout, render_mode=render_mode, **own
-        )
-
+    how: dict[str, Any] = {"layout": shared.layout, "render_mode": render_mode, **own}
+    one = functools.partial(HelpGymEnv, shared.make_env, shared.tasks, SensorSuite(), **how)
     slots = in_step(one, num_envs, max_episode_steps)
     return SharedSyncVectorEnv(slots, shared.sensor, threads=threads, opened=shared.opened)
 
