@@ -337,10 +337,8 @@ def _write_unit(
     to_matterport(graph, house, home / "connectivity.json")
     save_lines(home / "routes.jsonl", routes)
     counts = {s.name: save_lines(home / f"tasks_{s.name}.jsonl", tasks[s.part]) for s, _ in shares(unit, config)}
-    facts = UnitFacts(
-        VERSION, config, unit.group, unit.index, house.digest, nodes=len(graph.ids), routes=len(routes), tasks=counts
-    )
-    save_facts(home, facts)
+    sizes: dict[str, Any] = {"nodes": len(graph.ids), "routes": len(routes), "tasks": counts}
+    save_facts(home, UnitFacts(VERSION, config, unit.group, unit.index, house.digest, **sizes))
 
 
 def save_facts(home: Path, facts: UnitFacts) -> None:
@@ -351,12 +349,9 @@ def save_facts(home: Path, facts: UnitFacts) -> None:
 
 def shares(unit: Unit, config: DatasetConfig) -> list[tuple[SplitPlan, int]]:
     """The splits that a house serves, with its even share of their tasks."""
-    wanted = config.plan
     served = []
-    for split in wanted.splits:
-        if unit.group not in split.all_groups:
-            continue
-        houses = [u for u in units(wanted) if u.group in split.all_groups]
+    for split in (s for s in config.plan.splits if unit.group in s.all_groups):
+        houses = [u for u in units(config.plan) if u.group in split.all_groups]
         served.append((split, quota(split.tasks, len(houses), houses.index(unit))))
     return served
 
@@ -414,14 +409,8 @@ def write_index(config: DatasetConfig, folder: Path) -> Path:
         for path in sorted(home.iterdir()):
             if path.suffix in (".json", ".jsonl"):
                 files[f"{unit.name}/{path.name}"] = digest(path.read_bytes())[:16]
-    order = [s.name for s in config.plan.splits]
-    body = {
-        "version": VERSION,
-        "config": config.facts(),
-        "splits": {n: table[n] for n in order},
-        "digest": digest(files),
-        "files": files,
-    }
+    splits = {s.name: table[s.name] for s in config.plan.splits}
+    body = {"version": VERSION, "config": config.facts(), "splits": splits, "digest": digest(files), "files": files}
     path = folder / "dataset.json"
     write_json(path, body, indent=1)
     return path

@@ -192,13 +192,13 @@ def _hanna(data: Dataset, root: Path) -> list[Path]:
 
 def action_space(data: Dataset) -> dict[str, list[Item]]:
     """panoramic_action_space.json: '<scan>_<viewpoint>_<heading bin>' to the actions there."""
-    table = {}
-    for name in names_of(data):
-        graph = data.place(name).graph
-        for node, key in enumerate(graph.ids):
-            for b in range(TURNS):
-                table[f"{scan_name(name)}_{key}_{b}"] = action_list(graph, node, b)
-    return table
+    graphs = {scan_name(name): data.place(name).graph for name in names_of(data)}
+    return {
+        f"{scan}_{key}_{b}": action_list(graph, node, b)
+        for scan, graph in graphs.items()
+        for node, key in enumerate(graph.ids)
+        for b in range(TURNS)
+    }
 
 
 def _item(task: Task, number: int, place: StoredPlace) -> Item:
@@ -241,13 +241,10 @@ def _vnla(data: Dataset, root: Path) -> list[Path]:
         write_lines(home / "verbal_easy_vocab.txt", subgoal_words(merged=False)),
     ]
     for name in names_of(data):
-        regions = panorama_to_region(data.place(name))
-        files += [
-            write_lines(
-                root / "code/data/v1/scans" / scan_name(name) / "house_segmentations/panorama_to_region.txt", regions
-            ),
-            write_lines(root / "data/view_to_region" / f"{scan_name(name)}.panorama_to_region.txt", regions),
-        ]
+        regions, scan = panorama_to_region(data.place(name)), scan_name(name)
+        segments = root / "code/data/v1/scans" / scan / "house_segmentations"
+        files.append(write_lines(segments / "panorama_to_region.txt", regions))
+        files.append(write_lines(root / "data/view_to_region" / f"{scan}.panorama_to_region.txt", regions))
     return [*files, write_lines(root / "data" / "region_label.txt", region_lines())]
 
 
@@ -407,9 +404,8 @@ def _matterport(data: Dataset, root: Path) -> list[Path]:
     for name, file in panoramas.items():
         scan = root / "data/v1/scans" / scan_name(name)
         files += write_skyboxes(file, data.place(name).graph.ids, scan / "matterport_skybox_images")
-        files.append(
-            write_lines(scan / "house_segmentations/panorama_to_region.txt", panorama_to_region(data.place(name)))
-        )
+        regions = panorama_to_region(data.place(name))
+        files.append(write_lines(scan / "house_segmentations/panorama_to_region.txt", regions))
     return files
 
 

@@ -165,18 +165,10 @@ class Dataset:
         """The world with pictures of one house; `pictures` and `size` as in embodied.world.open_world."""
         from embodied.world import World  # the one part that needs a renderer
 
-        place = self.place(name)
+        place, how = self.place(name), parse_pictures(pictures, size)
         # what is in a data set is data: whoever reads it has other drivers and, later, another version
-        may = ("renderer", "code")
-        return World(
-            place.house,
-            catalogue,
-            place.graph,
-            cache,
-            parse_pictures(pictures, size),
-            file=self.panoramas(name),
-            ignore_fields=may,
-        )
+        may, file = ("renderer", "code"), self.panoramas(name)
+        return World(place.house, catalogue, place.graph, cache, how, file=file, ignore_fields=may)
 
     def panoramas(self, name: str) -> Path:
         """The file with the panoramas of a house, there or not."""
@@ -255,15 +247,9 @@ class Dataset:
         names = self.names(name)[:houses]
         sentences = self.utterances(names)
         places = {n: self.place(n) if worlds is None else worlds[n] for n in names}
-        inputs = EnvInputs(
-            places,
-            self.routes,
-            ANNA_SPLIT.get(name, ""),
-            PeoplesWords(sentences, PlainLanguage()) if sentences else None,
-            lambda: self.places("train").values(),
-            rules,
-            assistant,
-        )
+        voice, wording = PeoplesWords(sentences, PlainLanguage()) if sentences else None, ANNA_SPLIT.get(name, "")
+        training = lambda: self.places("train").values()
+        inputs = EnvInputs(places, self.routes, wording, voice, training, rules, assistant)
         tasks = self.task_kind.tasks_under((t for t in self.tasks(name) if t.world in places), places, rules)
         return SplitData(name, places, tasks, self.task_kind.environments(inputs))
 

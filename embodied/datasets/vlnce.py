@@ -128,16 +128,13 @@ def export_walks(
 def _samples(folder: Path, walks: Iterable[Taught], camera: CameraConfig) -> int:
     lines: list[str] = []
     for t in walks:
+        episode = t.trajectory.episode
         for k, (rgb, _) in enumerate(frames(t, camera)):
-            image = f"images/{t.trajectory.episode.world}_{t.trajectory.episode.id}/{k:03d}.jpg"
+            image = f"images/{episode.world}_{episode.id}/{k:03d}.jpg"
             (folder / image).parent.mkdir(parents=True, exist_ok=True)
             Image.fromarray(rgb).save(folder / image, quality=92)
-            facts = {"episode": t.trajectory.episode.id, "world": t.trajectory.episode.world, "step": k, "image": image}
-            facts |= {
-                "instruction": t.trajectory.episode.instruction,
-                "taken": t.trajectory.actions[k],
-                "action": t.labels[k],
-            }
+            facts = {"episode": episode.id, "world": episode.world, "step": k, "image": image}
+            facts |= {"instruction": episode.instruction, "taken": t.trajectory.actions[k], "action": t.labels[k]}
             lines.append(json.dumps(facts))
     write_lines(folder / "samples.jsonl", lines)
     return len(lines)
@@ -157,19 +154,12 @@ def _lerobot(folder: Path, walks: Iterable[Taught], camera: CameraConfig, with_d
         folder, (camera.height, camera.width), LEROBOT, key="observation.image", fps=STEPS, depth=with_depth
     )
     for t in walks:
-        trajectory, n = t.trajectory, len(t.labels)
+        trajectory, episode, n = t.trajectory, t.trajectory.episode, len(t.labels)
         poses = zip(trajectory.positions[:-1], trajectory.yaws[:-1], trajectory.pitches[:-1], strict=True)
-        rows = {
-            "observation.state": np.stack(
-                [odometry(trajectory.episode, p, y, math.radians(tilt)) for p, y, tilt in poses]
-            ),
-            "action": np.eye(len(SCORES), dtype=np.float32)[list(t.labels)],
-        }
+        states = [odometry(episode, p, y, math.radians(tilt)) for p, y, tilt in poses]
+        scores = np.eye(len(SCORES), dtype=np.float32)[list(t.labels)]
+        rows = {"observation.state": np.stack(states), "action": scores}
         rgb, depth = zip(*frames(t, camera), strict=True)
-        facts = {
-            "embodied/task": trajectory.episode.id,
-            "embodied/house": trajectory.episode.world,
-            "embodied/agent": "expert",
-        }
-        writer.add(rows, rgb, depth, [trajectory.episode.instruction] * n, [""] * n, trajectory.success > 0, facts)
+        facts = {"embodied/task": episode.id, "embodied/house": episode.world, "embodied/agent": "expert"}
+        writer.add(rows, rgb, depth, [episode.instruction] * n, [""] * n, trajectory.success > 0, facts)
     return writer.finish("embodied vlnce", "lerobot_vlnce")
