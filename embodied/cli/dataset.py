@@ -112,16 +112,9 @@ def run(args: DatasetOptions) -> None:
     from embodied.generate import HouseConfig
 
     HouseConfig(area=args.area)  # refuses what no house can have, before a folder is made
-    config = DatasetConfig(
-        args.kind,
-        chosen_scale(args),
-        args.seed,
-        args.area,
-        people=not args.no_people,
-        language=args.language,
-        rooms=not args.no_rooms,
-        ood=args.ood,
-    )
+    words: dict[str, Any] = {"language": args.language, "rooms": not args.no_rooms}
+    people = not args.no_people
+    config = DatasetConfig(args.kind, chosen_scale(args), args.seed, args.area, people=people, ood=args.ood, **words)
     watch = lambda jobs, total: tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
     if not (args.out / "dataset.json").exists():
         wanted = chosen_pictures(args.kind, args.pictures, args.size, None)
@@ -166,9 +159,7 @@ def chosen_scale(args: DatasetOptions) -> str | DatasetSize:
     sizes = (args.tasks, args.test_houses, args.evaluation_tasks)
     if args.houses is None:
         if any(n is not None for n in sizes):
-            raise ValueError(
-                "--tasks, --test-houses and --evaluation-tasks want --houses beside them; or choose a --scale"
-            )
+            raise ValueError("--tasks, --test-houses and --evaluation-tasks want --houses, or choose a --scale")
         return args.scale or "mini"
     if args.scale:
         raise ValueError("--scale and --houses say the same thing twice; leave one out")

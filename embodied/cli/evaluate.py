@@ -424,13 +424,8 @@ def write(evaluation: Evaluation) -> None:
     digest, agents = evaluation.data and evaluation.data.digest, [*evaluation.agents.values()]
     if args.out:
         about: dict[str, object] = {"data": digest, "seed": args.seed, "tasks": args.tasks, "agents": agents}
-        about |= {
-            "splits": evaluation.splits,
-            "rules": args.rules,
-            "doors": [args.closed_doors, args.doors],
-            "assistant": args.assistant,
-            "ask_after": args.ask_after,
-        }
+        about |= {"splits": evaluation.splits, "rules": args.rules, "doors": [args.closed_doors, args.doors]}
+        about |= {"assistant": args.assistant, "ask_after": args.ask_after}
         tables.save(rows, args.out, "table")
         write_json(args.out / "run.json", fingerprint(**{**about, **evaluation.facts}), indent=1)
         note(f"table and episodes in {args.out}")

@@ -55,14 +55,7 @@ def run(args: GenerateOptions) -> None:
     if not args.no_mjcf:
         fetch(catalogue, house)
         export_mjcf(house, catalogue, args.out)
-    facts = {
-        "seed": args.seed,
-        "digest": house.digest,
-        "area_m2": round(house.area, 1),
-        "rooms": len(house.rooms),
-        "objects": len(house.placements),
-        "nodes": len(graph.ids),
-        "out": str(args.out),
-    }
+    facts = {"seed": args.seed, "digest": house.digest, "area_m2": round(house.area, 1), "rooms": len(house.rooms)}
+    facts |= {"objects": len(house.placements), "nodes": len(graph.ids), "out": str(args.out)}
     text = f"{house.name}: {facts['rooms']} rooms on {facts['area_m2']} m2, {facts['objects']} objects, "
     show(args, facts, text + f"{facts['nodes']} viewpoints -> {args.out}")

@@ -13,7 +13,7 @@ import dataclasses
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from embodied.cli.common import Furnished, Printed, catalogue_of, show
 from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS
@@ -69,7 +69,7 @@ def run(args: LightOptions) -> None:
     device()  # or LightError, before any work
     catalogue = catalogue_of(args)
     house = load_lit_house(args.folder, catalogue)
-    changed = with_sky(house, args.hour, args.weather, args.lamps, args.landscape, args.season)
+    changed = with_sky(house, args)
     lightings = lightings_of(changed, args.lights)
     if args.lights > 1 or changed != house:
         with locked(args.folder):
@@ -91,18 +91,11 @@ def run(args: LightOptions) -> None:
     show(args, facts[0] if args.lights == 1 else {"lights": facts}, message)
 
 
-def with_sky(
-    house: House,
-    hour: float | None,
-    weather: str | None,
-    lamps: str | None,
-    landscape: str | None = None,
-    season: str | None = None,
-) -> House:
-    """`house` at another hour, in other weather or surroundings, with its lamps on or off; None keeps what is."""
-    given: dict[str, Any] = {"hour": hour, "weather": weather, "landscape": landscape, "season": season}
+def with_sky(house: House, args: LightOptions) -> House:
+    """`house` as the options want its sky, surroundings and lamps."""
+    given = {name: getattr(args, name) for name in ("hour", "weather", "landscape", "season")}
     sky = dataclasses.replace(house.sky, **{name: value for name, value in given.items() if value is not None})
     lights = house.lights
-    if lamps is not None:
-        lights = tuple(dataclasses.replace(light, on=lamps == "on") for light in lights)
+    if args.lamps is not None:
+        lights = tuple(dataclasses.replace(light, on=args.lamps == "on") for light in lights)
     return dataclasses.replace(house, sky=sky, lights=lights)

@@ -81,15 +81,11 @@ def run(args: PeopleStudyOptions) -> None:
     out = args.out or args.study.with_suffix(".people")
     address = args.address or listening_at(args.host, args.port)
     client = functools.cache(lambda: client_of(args))
-    opened = open_study(
-        args.study,
-        out,
-        None if args.summary else lambda data, name: drawn(data, name, study, args),
-        agents_of(args.study.parent / study.data, client),
-        {"llm": assistant_maker("llm", client, args.prompts)},
-        addresses_of(args),
-        lambda data, name: live_world(data, name, study, args),
-    )
+    draw = None if args.summary else functools.partial(drawn, study=study, args=args)
+    live = functools.partial(live_world, study=study, args=args)
+    agents = agents_of(args.study.parent / study.data, client)
+    assistants = {"llm": assistant_maker("llm", client, args.prompts)}
+    opened = open_study(args.study, out, draw, agents, assistants, addresses_of(args), live)
     if args.summary:
         from embodied.serve.results import as_text, summary
 

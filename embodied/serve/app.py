@@ -29,7 +29,7 @@ from embodied.records import parse, to_json
 from embodied.serve.driving import EncodedPanoramas, Live
 from embodied.serve.game import Game
 from embodied.serve.results import summary
-from embodied.serve.screens import houses_of, live_name, next_part, plan_of, screen_of
+from embodied.serve.screens import live_name, next_part, plan_of, screen_of
 from embodied.serve.sessions import Person, Sessions
 from embodied.serve.store import Event, Store
 from embodied.serve.study import LONGEST_TEXT, origin_of, page_address
@@ -89,7 +89,7 @@ class Server:
         self._secret = secret.encode()
         self._sockets: dict[str, WebSocket] = {}
         self._bots: dict[str, asyncio.Task[None]] = {}
-        houses = houses_of(sessions)
+        houses = {name: place for table in sessions.tables.values() for name, place in table.places.items()}
         self._strangers: set[str] = set()
         self._plan = functools.cache(lambda house: plan_of(houses[house], pictures))
         self.failed = False
@@ -165,9 +165,8 @@ class Server:
             except Exception as e:  # of anybody's policy or assistant: the episode ends, the study goes on
                 log.exception("the bot of game %s failed", game.id)
                 if not game.over and not self.failed:
-                    await self.apply_event(
-                        Event("broken", time.time(), body={"game": game.id, "why": f"bot: {e!r:.200}"})
-                    )
+                    body = {"game": game.id, "why": f"bot: {e!r:.200}"}
+                    await self.apply_event(Event("broken", time.time(), body=body))
             for person in people:
                 await self.show(person)
 

@@ -177,10 +177,8 @@ class Game:
     @property
     def episode(self) -> Episode:
         """The finished episode, with the seconds of its steps."""
-        names = [
-            self.people.get("agent", self.table.part.agent),
-            self.people.get("assistant", self.table.part.assistant),
-        ]
+        part = self.table.part
+        names = [self.people.get("agent", part.agent), self.people.get("assistant", part.assistant)]
         return dataclasses.replace(self.env.episode(" with ".join(names)), steps=tuple(self._steps))
 
     @property

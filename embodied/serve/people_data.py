@@ -45,9 +45,8 @@ class Worded:
 
 def worded_by_people(folder: Path) -> list[Worded]:
     """Answers and descriptions of people, from the folder of a study; the same words for the same way count once."""
-    worded = [
-        w for path in sorted(folder.glob("episodes*.jsonl")) for e in load_lines(path, Episode) for w in answers(e)
-    ]
+    episodes = (e for path in sorted(folder.glob("episodes*.jsonl")) for e in load_lines(path, Episode))
+    worded = [w for e in episodes for w in answers(e)]
     judged = folder / JUDGEMENTS
     for j in load_lines(judged, Judgement) if judged.exists() else ():
         path = without_repeats(j.episode.nodes)
@@ -106,10 +105,8 @@ def write_people_dataset(source: Dataset, words: Sequence[Worded], out: Path, *,
         of_house[w.world].append(w)
     for name in sorted(names):
         _write_house(source, name, of_house[name], out / "houses" / name, only)
-    if (source.folder / "features").exists():
-        shutil.copytree(
-            source.folder / "features", out / "features", copy_function=lambda a, b: share(Path(a), Path(b))
-        )
+    if (features := source.folder / "features").exists():
+        shutil.copytree(features, out / "features", copy_function=lambda a, b: share(Path(a), Path(b)))
     write_bytes(out / "config.json", (source.folder / "config.json").read_bytes())
     write_index(source.config, out)
     return Dataset(out)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from embodied.datasets.store import Dataset
 from embodied.interface import Episode
@@ -112,17 +113,8 @@ def serve(opened: Opened, host: str, port: int) -> None:
 
     from embodied.serve.app import LONGEST_MESSAGE, app_of
 
-    uvicorn.run(
-        app_of(opened.server),
-        host=host,
-        port=port,
-        log_level="warning",
-        access_log=False,
-        ws="websockets-sansio",
-        ws_max_size=4 * LONGEST_MESSAGE,
-        ws_ping_interval=15,
-        ws_ping_timeout=20,
-        limit_concurrency=2500,
-        timeout_graceful_shutdown=2,
-        server_header=False,
-    )
+    sockets = {"ws": "websockets-sansio", "ws_max_size": 4 * LONGEST_MESSAGE, "ws_ping_interval": 15}
+    limits = {"ws_ping_timeout": 20, "limit_concurrency": 2500, "timeout_graceful_shutdown": 2}
+    quiet = {"log_level": "warning", "access_log": False, "server_header": False}
+    how: dict[str, Any] = {**sockets, **limits, **quiet}
+    uvicorn.run(app_of(opened.server), host=host, port=port, **how)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -72,20 +71,11 @@ def game_of(game: Game, role: str, pictures: EncodedPanoramas) -> Screen:
     world = game.task.world
     shown = lambda node: None if node is None else pictures.name(world, node)
     conversation = [{"who": s["who"], "text": detokenized(s["text"]), "pano": shown(s["picture"])} for s in game.said]
-    return {
-        "screen": role,
-        "game": game.id,
-        "turn": game.turn,
-        "practice": game.practice,
-        "advice": game.table.part.advice,
-        "request": detokenized(game.task.request),
-        "said": conversation,
-        "question": game.question,
-        "yours": game.mover == role,
-        "pano": pictures.name(world, game.situation.pose.node),
-        "yaw": game.situation.pose.yaw,
-        "pitch": game.situation.pose.pitch,
-    }
+    pose, request = game.situation.pose, detokenized(game.task.request)
+    play = {"game": game.id, "turn": game.turn, "practice": game.practice, "yours": game.mover == role}
+    words = {"advice": game.table.part.advice, "request": request, "said": conversation, "question": game.question}
+    seen = {"pano": pictures.name(world, pose.node), "yaw": pose.yaw, "pitch": pose.pitch}
+    return {"screen": role, **play, **words, **seen}
 
 
 def agent_of(game: Game, pictures: EncodedPanoramas) -> Screen:
@@ -204,8 +194,3 @@ def plan_of(place: Place, pictures: EncodedPanoramas) -> Screen:
         "edges": graph.edges.tolist(),
         "panos": [pictures.name(house.name, n) for n in range(len(graph.positions))],
     }
-
-
-def houses_of(sessions: Sessions) -> Mapping[str, Place]:
-    """All houses in which something is played."""
-    return {name: place for table in sessions.tables.values() for name, place in table.places.items()}

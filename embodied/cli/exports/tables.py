@@ -134,11 +134,8 @@ def run_vqa(args: VqaExportOptions) -> None:
     from embodied.datasets.vqa.build import VqaData
     from embodied.datasets.vqa.types import TYPES
 
-    data, videos, readmes = (
-        VqaData(args.data),
-        Path("vsibench/embodied"),
-        Path(__file__).parents[2] / "datasets/readmes",
-    )
+    data, videos = VqaData(args.data), Path("vsibench/embodied")
+    readmes = Path(__file__).parents[2] / "datasets/readmes"
     names = ("id", "dataset", "scene_name", "question_type", "question", "options", "ground_truth")
     values = lambda q: (q.id, "embodied", q.walk, q.type, q.text, q.prompt.split("\n")[2:-1] or None, q.letter)
     turns = lambda q: [{"from": "human", "value": f"<image>\n{q.prompt}"}, {"from": "gpt", "value": q.letter}]

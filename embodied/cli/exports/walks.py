@@ -91,13 +91,9 @@ def run_drives(args: DriveOptions) -> None:
     from embodied.gym.lerobot import DriveForLeRobot
     from embodied.gym.lerobot.drives import export_drives
 
-    seen: dict[str, Any] = {
-        "height": args.size,
-        "width": args.size,
-        "observations": ("rgb",),
-        "pictures": args.pictures,
-    }
-    env = DriveForLeRobot(make(data=args.data, split=args.split, cache=args.cache, **seen))
+    seen: dict[str, Any] = {"height": args.size, "width": args.size, "observations": ("rgb",)}
+    houses: dict[str, Any] = {"data": args.data, "split": args.split, "cache": args.cache, "pictures": args.pictures}
+    env = DriveForLeRobot(make(**houses, **seen))
     watch = functools.partial(bar, name="drives", unit="drive")
     seed = Dataset(args.data).config.seed
     steps = export_drives(env, args.out, args.drives, seed=seed, action_noise=args.action_noise, watch=watch)
@@ -159,9 +155,8 @@ def run_lerobot(args: LeRobotOptions) -> None:
     succeeded = lambda episode: success(episode, data.place(episode.task.world).graph) > 0
     watched, size = bar(episodes, "episodes", "episode"), (args.size, args.size)
     steps = export_lerobot(data, args.out, watched, succeeded=succeeded, size=size, depth=args.depth)
-    text = (
-        f"{len(episodes)} episodes, {steps} steps in {args.out}: LeRobotDataset('{args.out.name}', root='{args.out}')"
-    )
+    text = f"{len(episodes)} episodes, {steps} steps in {args.out}: "
+    text += f"LeRobotDataset('{args.out.name}', root='{args.out}')"
     show(args, {"episodes": len(episodes), "steps": steps, "out": str(args.out)}, text)
 
 
