@@ -36,7 +36,9 @@ by `import embodied`.
 
 from __future__ import annotations
 
+import ast
 import importlib
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.gym.registration import register_with_gymnasium
@@ -67,81 +69,16 @@ if TYPE_CHECKING:
 __version__: str
 """The version of the installed distribution."""
 
-_HOMES = {
-    "embodied.assets.cache": ("default_cache",),
-    "embodied.assets.catalogue": ("Catalogue", "load_catalogue"),
-    "embodied.datasets.build": ("DatasetConfig", "build_dataset", "draw_panoramas"),
-    "embodied.datasets.store": ("Dataset",),
-    "embodied.evaluation.evaluate": ("evaluate", "play"),
-    "embodied.evaluation.tables": ("markdown",),
-    "embodied.generate": ("HouseConfig", "generate_house"),
-    "embodied.generate.plan_file": ("house_of_plan", "load_plan"),
-    "embodied.gym.sensors": ("ViewSettings",),
-    "embodied.house.house": ("House",),
-    "embodied.house.validation": ("load_house",),
-    "embodied.interface": (
-        *("Ask", "Episode", "Intention", "Move", "Observation"),
-        *("Reply", "Situation", "Stop", "Subtask", "Task"),
-    ),
-    "embodied.navigation.graph": ("NavGraph", "build_graph"),
-    "embodied.render.classic": ("Renderer",),
-    "embodied.render.panorama": ("Panorama",),
-    "embodied.render.pictures": ("Baked", "Traced", "Unlit"),
-    "embodied.scene.robots": ("place",),
-    "embodied.seeds": ("stream",),
-    "embodied.world": ("World", "open_folder", "open_world", "scene_spec"),
+_FOUND = {
+    alias.asname or alias.name: (node.module or "", alias.name)
+    for block in ast.parse(Path(__file__).read_text(encoding="utf-8")).body
+    if isinstance(block, ast.If)
+    for node in block.body
+    if isinstance(node, ast.ImportFrom)
+    for alias in node.names
 }
-"""The public names of each module."""
-_FOUND = {name: (module, name) for module, names in _HOMES.items() for name in names} | {
-    "baseline": ("embodied.evaluation.evaluate", "agent"),
-    "make_env": ("embodied.gym.env", "make"),
-}
-
-__all__ = [
-    "__version__",
-    "Ask",
-    "Baked",
-    "Catalogue",
-    "Dataset",
-    "DatasetConfig",
-    "Episode",
-    "House",
-    "HouseConfig",
-    "Intention",
-    "Move",
-    "NavGraph",
-    "Observation",
-    "Panorama",
-    "Renderer",
-    "Reply",
-    "Situation",
-    "Stop",
-    "Subtask",
-    "Task",
-    "Traced",
-    "Unlit",
-    "ViewSettings",
-    "World",
-    "baseline",
-    "build_dataset",
-    "build_graph",
-    "default_cache",
-    "draw_panoramas",
-    "evaluate",
-    "generate_house",
-    "house_of_plan",
-    "load_catalogue",
-    "load_house",
-    "load_plan",
-    "make_env",
-    "markdown",
-    "open_folder",
-    "open_world",
-    "place",
-    "play",
-    "scene_spec",
-    "stream",
-]
+"""Public name to its module and its name there: the imports above, each of which is done on first use."""
+__all__ = sorted(["__version__", *_FOUND])
 
 
 def __getattr__(name: str) -> object:
