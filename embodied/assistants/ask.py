@@ -17,12 +17,8 @@ from embodied.tasks.ask import Look
 from embodied.tasks.goals import footprint_distance
 
 QUESTIONS = (
-    Intention.CONFIRM,
-    Intention.APPEARANCE,
-    Intention.REGION,
-    Intention.ROUTE,
-    Intention.DISAMBIGUATE,
-    Intention.FREE,
+    *(Intention.CONFIRM, Intention.APPEARANCE, Intention.REGION),
+    *(Intention.ROUTE, Intention.DISAMBIGUATE, Intention.FREE),
 )
 CONFIRM_DISTANCE = 2.0
 """Metres within which one is at a thing."""

@@ -6,7 +6,7 @@ import bisect
 import functools
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
@@ -180,18 +180,8 @@ def _stable(word: str) -> int:
 
 
 SIDES = (
-    "ahead",
-    "ahead on the left",
-    "left",
-    "left",
-    "left",
-    "behind on the left",
-    "behind",
-    "behind on the right",
-    "right",
-    "right",
-    "right",
-    "ahead on the right",
+    *("ahead", "ahead on the left", *3 * ("left",), "behind on the left"),
+    *("behind", "behind on the right", *3 * ("right",), "ahead on the right"),
 )
 """Side on which something is, by its direction in steps of 30 degrees counter-clockwise from the gaze."""
 
@@ -208,7 +198,8 @@ def described(description: Description, pose: Pose | None = None) -> str:
     rooms = [f.name.replace("_", " ") for f in description if f.kind == "room"]
     things = [_thing(f, pose) for f in description if f.kind == "object"][:6]
     place = f"{'You are in' if pose else 'Go to a place in'} the {rooms[0]}" if rooms else "There is no room to name"
-    return f"{place}, with {_listed(things)}." if things else f"{place}."
+    listed = " and ".join([", ".join(things[:-1]), *things[-1:]] if len(things) > 1 else things)
+    return f"{place}, with {listed}." if things else f"{place}."
 
 
 def _thing(feature: Feature, pose: Pose | None) -> str:
@@ -216,10 +207,6 @@ def _thing(feature: Feature, pose: Pose | None) -> str:
     if pose is None:
         return f"{name} ({feature.distance} m)"
     return f"{name} ({feature.distance} m, {SIDES[(feature.horizontal - pose.turn) % TURNS]})"
-
-
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
 
 
 def side(bearing: float) -> str:

@@ -22,22 +22,9 @@ if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
 
 PERCENT = (
-    "success",
-    "strict success",
-    "spl",
-    "oracle success",
-    "mistake repeat",
-    "request repeat",
-    "target success (HANNA)",
-    "room success (VNLA)",
-    "success (R2R)",
-    "oracle success (R2R)",
-    "right place first",
-    "precision",
-    "recall",
-    "question precision",
-    "blockers cleared",
-    "ask F1",
+    *("success", "strict success", "spl", "oracle success", "mistake repeat", "request repeat"),
+    *("target success (HANNA)", "room success (VNLA)", "success (R2R)", "oracle success (R2R)"),
+    *("right place first", "precision", "recall", "question precision", "blockers cleared", "ask F1"),
 )
 """Columns of all kinds and of learners shown in per cent; those of one kind of task say so (Metric)."""
 SHARES = ("success", "strict success", "oracle success")
@@ -262,19 +249,8 @@ def markdown(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str:
 
 
 def as_json(rows: Sequence[Row]) -> str:
-    body = [
-        {
-            "agent": r.agent,
-            "split": r.split,
-            "seed": r.seed,
-            "episodes": r.episodes,
-            "houses": r.houses,
-            "values": {
-                k: {"mean": _number(v.mean), "half_width_95": _number(v.half), "n": v.n} for k, v in r.values.items()
-            },
-        }
-        for r in rows
-    ]
+    plain = lambda v: {"mean": _number(v.mean), "half_width_95": _number(v.half), "n": v.n}
+    body = [{**vars(r), "values": {k: plain(v) for k, v in r.values.items()}} for r in rows]
     return json.dumps(body, indent=1) + "\n"
 
 

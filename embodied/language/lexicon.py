@@ -143,18 +143,12 @@ class Lexicon:
         """Tokens as adjectives, the longest first ('dark brown', 'wood'); None if they are none."""
         words = []
         while tokens:
-            n = next(
-                (
-                    n
-                    for n in range(len(tokens), 0, -1)
-                    if " ".join(tokens[:n]) in self.adjectives or " ".join(tokens[:n]) in EMPTY
-                ),
-                None,
-            )
-            if n is None:
+            starts = (" ".join(tokens[:n]) for n in range(len(tokens), 0, -1))
+            word = next((w for w in starts if w in self.adjectives or w in EMPTY), None)
+            if word is None:
                 return None
-            words.append(" ".join(tokens[:n]))
-            tokens = tokens[n:]
+            words.append(word)
+            tokens = tokens[len(word.split(" ")) :]
         return words
 
 

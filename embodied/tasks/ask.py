@@ -99,18 +99,8 @@ def ask_tasks(pool: AskPool, count: int, *, seed: int) -> list[Task]:
             break
         goal, goal_nodes = pool.goals[int(pairs[k, 0])]
         turn = int(stream(seed, "task", "ask", pool.world, j).integers(TURNS))
-        task = Task(
-            id=f"{pool.world}/ask/{j}",
-            kind="ask",
-            world=pool.world,
-            start=Pose(int(pairs[k, 1]), turn),
-            goal=goal,
-            goal_nodes=goal_nodes,
-            request=request(goal),
-            radius=0.0,
-            horizon=HORIZON,
-        )
-        tasks.append(task)
+        name, start = f"{pool.world}/ask/{j}", Pose(int(pairs[k, 1]), turn)
+        tasks.append(Task(name, "ask", pool.world, start, goal, goal_nodes, request(goal), radius=0.0, horizon=HORIZON))
     return tasks
 
 
@@ -163,11 +153,8 @@ def _descriptions(world: Place, x: Instance, alike: list[Instance], look: Look) 
     for n in range(len(words_of_it) + 1):
         for words in itertools.combinations(words_of_it, n):
             for kind in (None, x.room_kind):
-                fits = [
-                    o.placement
-                    for o in alike
-                    if all(w in looks[o.placement] for w in words) and kind in (None, o.room_kind)
-                ]
+                there = [o.placement for o in alike if kind in (None, o.room_kind)]
+                fits = [name for name in there if all(w in looks[name] for w in words)]
                 others = tuple(o.placement for o in alike if o.placement not in fits)
                 descriptions[words, kind] = FindDescribed(x.object_class, x.placement, tuple(fits), others, words, kind)
     return list(descriptions.values())

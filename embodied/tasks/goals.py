@@ -174,18 +174,8 @@ def task_of_pair(
     """
     goal, start, rng = draw(pool, index, seed=seed, kind=kind)
     what = FindObject(goal.object_class, goal.room_kind, goal.placements)
-    return Task(
-        id=f"{pool.world}/{kind}/{index}",
-        kind=kind,
-        world=pool.world,
-        start=start,
-        goal=what,
-        goal_nodes=goal.goal_nodes,
-        request=language.request(what, rng=rng),
-        radius=radius,
-        horizon=horizon,
-        budget=budget,
-    )
+    name, words = f"{pool.world}/{kind}/{index}", language.request(what, rng=rng)
+    return Task(name, kind, pool.world, start, what, goal.goal_nodes, words, radius, horizon, budget)
 
 
 def draw(pool: Pool, index: int, *, seed: int, kind: str) -> tuple[GoalClass, Pose, np.random.Generator]:

@@ -16,14 +16,7 @@ def object_source(source: EpisodeSource) -> list[ContinuousEpisode]:
     return [e for w in source.worlds.values() for e in object_episodes(w, OBJECTS, seed=seed, navmeshes=navmeshes)]
 
 
+BODY, CAMERA = Body(turn=30, looks=True, eye=0.88), CameraConfig(480, 640, 79.0)
 OBJECTNAV = register_continuous(
-    ContinuousTask(
-        "objectnav",
-        "ObjectNav",
-        read_objectnav,
-        object_source,
-        Body(turn=30, looks=True, eye=0.88),
-        CameraConfig(480, 640, 79.0),
-        gps=True,
-    )
+    ContinuousTask("objectnav", "ObjectNav", read_objectnav, object_source, BODY, CAMERA, gps=True)
 )

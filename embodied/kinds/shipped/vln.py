@@ -28,17 +28,9 @@ VLN_HORIZON = 20
 
 def vln_task(world: str, route: Route) -> Task:
     """The task of following `route` of the house `world`."""
-    return Task(
-        id=f"{world}/vln/{route.id}",
-        kind="vln",
-        world=world,
-        start=Pose(route.path[0], route.turn, route.tilt),
-        goal=FollowRoute(route.id, route.path),
-        goal_nodes=(route.path[-1],),
-        request=route.instruction,
-        radius=VLN_RADIUS,
-        horizon=VLN_HORIZON,
-    )
+    name, start, end = f"{world}/vln/{route.id}", Pose(route.path[0], route.turn, route.tilt), route.path[-1:]
+    goal = FollowRoute(route.id, route.path)
+    return Task(name, "vln", world, start, goal, end, route.instruction, VLN_RADIUS, VLN_HORIZON)
 
 
 def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
