@@ -78,7 +78,8 @@ _FOUND = {
     for alias in node.names
 }
 """Public name to its module and its name there: the imports above, each of which is done on first use."""
-__all__ = ["__version__"] + sorted(_FOUND)
+__all__ = list(_FOUND)
+__all__ += ["__version__"]
 
 
 def __getattr__(name: str) -> object:

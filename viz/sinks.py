@@ -147,7 +147,7 @@ def blueprint_of(house: House, episode: Episode, seen: PictureSettings | None = 
     if stack:
         texts = [doing, rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first")]
     plots = _plots(thought, stack, budget=episode.budget is not None)
-    rows = [rrb.Horizontal(ahead, *sent), panorama, rrb.Horizontal(*texts)]
+    rows: list[rrb.Container | rrb.View] = [rrb.Horizontal(ahead, *sent), panorama, rrb.Horizontal(*texts)]
     rows += [rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")] if dialogue else []
     right = rrb.Vertical(*rows, row_shares=[5, 3, 2, 3][: len(rows)])
     body, *others = (TextLogColumn(kind, visible=kind == "Body") for kind in ("Body", "EntityPath", "LogLevel"))

@@ -194,7 +194,7 @@ def write_vlnce(
             "forward_steps": sum(a == 1 for a in trajectory.actions),
             "actions": list(trajectory.actions),
         }
-    vocabulary = {"word_list": word_list, "word2idx_dict": number, "itos": word_list, "stoi": number}
+    vocabulary: dict[str, Any] = {"word_list": word_list, "word2idx_dict": number, "itos": word_list, "stoi": number}
     vocabulary |= {"num_vocab": len(word_list), "UNK_INDEX": 1, "PAD_INDEX": 0}
     home = Path(folder) / split
     return [
