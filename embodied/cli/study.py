@@ -27,15 +27,8 @@ def run_tables(study: Callable[[Any], Any], args: Any) -> None:
     from embodied.agents.studies.engine import run_study
 
     learner = study(args)
-    files = run_study(
-        learner,
-        getattr(args, "tables", None) or list(learner.tables()),
-        args.out,
-        rows=args.rows or None,
-        workers=args.workers,
-        report=args.report,
-        command=" ".join(["embodied", *sys.argv[1:]]),
-        note=note,
-    )
+    tables, command = getattr(args, "tables", None) or list(learner.tables()), " ".join(["embodied", *sys.argv[1:]])
+    how = {"rows": args.rows or None, "workers": args.workers, "report": args.report}
+    files = run_study(learner, tables, args.out, command=command, note=note, **how)
     for path in files.values():
         print(path.read_text(encoding="utf-8"))

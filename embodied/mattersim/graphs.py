@@ -95,16 +95,11 @@ def load_graphs(folder: str, scans: tuple[str, ...]) -> Graphs:
         first[scan], at = at, at + sizes[scan]
     poses = np.array([item["pose"] for _, item in items], np.float32).reshape(-1, 4, 4)
     included = np.array([bool(item["included"]) for _, item in items], bool)
-    neighbours = _padded(
-        [
-            [
-                first[scan] + j
-                for j, open_ in enumerate(item["unobstructed"])
-                if open_ and first[scan] + j != row and included[first[scan] + j]
-            ]
-            for row, (scan, item) in enumerate(items)
-        ]
+    near = ((first[scan], row, item["unobstructed"]) for row, (scan, item) in enumerate(items))
+    joined = (
+        [n + j for j, open_ in enumerate(ways) if open_ and n + j != row and included[n + j]] for n, row, ways in near
     )
+    neighbours = _padded(list(joined))
     positions = np.ascontiguousarray(poses[:, :3, 3])
     to = positions[neighbours] - positions[:, None]
     flat = np.sqrt((to[..., :2] ** 2).sum(-1))

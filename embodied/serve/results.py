@@ -108,19 +108,11 @@ def summary(sessions: Sessions) -> dict[str, Any]:
     ends = Counter(p.ended for p in people)
     active = sum(p.connected > 0 and p.ended is None for p in people)
     away = sum(p.connected == 0 and p.ended is None for p in people)
-    return {
-        "title": sessions.study.title,
-        "people": {
-            "joined": len(people),
-            "agreed": sum(p.consented for p in people),
-            "finished": ends["done"],
-            "left": ends["left"],
-            "here now": active,
-            "away, not finished": away,
-        },
-        "dropout": ratio(away + ends["left"], len(people) - active),
-        "parts": [part_summary(sessions, p.name) for p in sessions.study.parts],
-    }
+    counts = {"joined": len(people), "agreed": sum(p.consented for p in people), "finished": ends["done"]}
+    counts |= {"left": ends["left"], "here now": active, "away, not finished": away}
+    dropout = ratio(away + ends["left"], len(people) - active)
+    parts = [part_summary(sessions, p.name) for p in sessions.study.parts]
+    return {"title": sessions.study.title, "people": counts, "dropout": dropout, "parts": parts}
 
 
 def part_summary(sessions: Sessions, name: str) -> dict[str, Any]:
@@ -130,12 +122,10 @@ def part_summary(sessions: Sessions, name: str) -> dict[str, Any]:
         games = [g for g in sessions.games.values() if g.table.part.name == name and not g.practice]
         whole = [g for g in games if g.over and g.broken is None]
         answers = [s for g in whole for s in g.said if s["who"] == "assistant"]
+        facts = {"name": name, "wanted": len(sessions.tables[name].tasks) * part.answers, "done": len(whole)}
+        facts |= {"running": sum(not g.over for g in games), "broken off": sum(g.broken is not None for g in games)}
         return {
-            "name": name,
-            "wanted": len(sessions.tables[name].tasks) * part.answers,
-            "done": len(whole),
-            "running": sum(not g.over for g in games),
-            "broken off": sum(g.broken is not None for g in games),
+            **facts,
             "success": ratio(sum(is_success(g) for g in whole), len(whole)),
             "questions per episode": mean([g.env.requests for g in whole]),
             "words per answer": mean([len(a["text"].split()) for a in answers]),

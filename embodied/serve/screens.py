@@ -108,32 +108,24 @@ def live_name(game: Game, pictures: EncodedPanoramas) -> str:
 
 def moves_of(seen: Observation, situation: Situation, pictures: EncodedPanoramas) -> list[Screen]:
     """The moves that are allowed: where they are seen, and the panorama to fetch in advance."""
-    c, at = seen.candidates, situation.world.graph.positions
-    return [
-        {
-            "candidate": i,
-            "yaw": round(float(situation.pose.yaw + c.bearing[i]), 4),
-            "pitch": round(float(c.slope[i]), 4),
-            "distance": round(float(np.linalg.norm(at[node] - at[situation.pose.node])), 2),
-            "pano": pictures.name(situation.task.world, node),
-        }
-        for i, node in enumerate(situation.candidate_nodes)
-        if c.allowed[i]
-    ]
+    c, at, pose = seen.candidates, situation.world.graph.positions, situation.pose
+    moves = []
+    for i, node in enumerate(situation.candidate_nodes):
+        if c.allowed[i]:
+            direction = {"yaw": round(float(pose.yaw + c.bearing[i]), 4), "pitch": round(float(c.slope[i]), 4)}
+            metres = round(float(np.linalg.norm(at[node] - at[pose.node])), 2)
+            pano = pictures.name(situation.task.world, node)
+            moves.append({"candidate": i, **direction, "distance": metres, "pano": pano})
+    return moves
 
 
 def assistant_of(game: Game) -> Screen:
     """The assistant's view of a game."""
     part, s = game.table.part, game.situation
-    show_way, show_goal = part.show_way or game.practice, part.show_goal or game.practice
-    return {
-        "house": s.task.world,
-        "node": s.pose.node,
-        "trail": list(s.trail),
-        "goals": list(s.task.goal_nodes) if show_goal else [],
-        "way": list(way_to_goal(s, part.way)) if show_way else [],
-        "sendPictures": part.send_pictures,
-    }
+    goals = list(s.task.goal_nodes) if part.show_goal or game.practice else []
+    way = list(way_to_goal(s, part.way)) if part.show_way or game.practice else []
+    here = {"house": s.task.world, "node": s.pose.node, "trail": list(s.trail)}
+    return {**here, "goals": goals, "way": way, "sendPictures": part.send_pictures}
 
 
 def judge_of(sessions: Sessions, person: Person, pictures: EncodedPanoramas) -> Screen:
@@ -182,15 +174,10 @@ def plan_of(place: Place, pictures: EncodedPanoramas) -> Screen:
     house, graph = place.house, place.graph
     floor = {r.id: r.storey for r in house.rooms}
     inner = [o for o in house.openings if o.kind != "window"]
-    return {
-        "name": house.name,
-        "rooms": [
-            {"kind": r.kind.replace("_", " "), "outline": np.round(r.polygon, 2).tolist(), "floor": floor[r.id]}
-            for r in house.rooms
-        ],
-        "doors": [{"line": np.round([o.a, o.b], 2).tolist(), "floor": floor[o.rooms[0]]} for o in inner],
-        "nodes": np.round(graph.positions[:, :2], 2).tolist(),
-        "floors": [floor[r] for r in graph.room_of_node],
-        "edges": graph.edges.tolist(),
-        "panos": [pictures.name(house.name, n) for n in range(len(graph.positions))],
-    }
+    plain = lambda points: np.round(points, 2).tolist()
+    room = lambda r: {"kind": r.kind.replace("_", " "), "outline": plain(r.polygon), "floor": floor[r.id]}
+    doors = [{"line": plain([o.a, o.b]), "floor": floor[o.rooms[0]]} for o in inner]
+    panos = [pictures.name(house.name, n) for n in range(len(graph.positions))]
+    rooms, nodes = [room(r) for r in house.rooms], plain(graph.positions[:, :2])
+    about = {"name": house.name, "rooms": rooms, "doors": doors, "nodes": nodes, "panos": panos}
+    return {**about, "floors": [floor[r] for r in graph.room_of_node], "edges": graph.edges.tolist()}
