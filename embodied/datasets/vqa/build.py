@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,26 +13,35 @@ from typing import Any
 
 import joblib
 import numpy as np
+import shapely
 
 from embodied.assets.cache import digest, drafts, write_json
-from embodied.assets.catalogue import load_catalogue
+from embodied.assets.catalogue import Catalogue, load_catalogue
+from embodied.assets.moving_parts import OPENING_CLASSES
 from embodied.datasets.build import Watch, for_each_unit, make_dataset_house
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.vqa.scene import WalkScene
 from embodied.datasets.vqa.scoring import VqaQuestion, thinned
-from embodied.datasets.vqa.types import TYPES
-from embodied.datasets.vqa.walks import Walk, cameras, film, tour
+from embodied.datasets.vqa.types import CHANGE, TYPES
+from embodied.datasets.vqa.walks import Walk, cameras, film, look_around, tour, view_of
 from embodied.generate import HouseConfig
+from embodied.generate.left_open import left_open
+from embodied.generate.people import CLASS, add_people, place_people
 from embodied.house.house import House
 from embodied.locks import locked
 from embodied.navigation.connectivity import from_matterport, to_matterport
+from embodied.navigation.graph import NavGraph
 from embodied.records import from_plain, load_lines, read_json, save_lines, to_json
 from embodied.render.pictures import parse_pictures
+from embodied.scene.model import loose
 from embodied.seeds import stream
 from embodied.world import World
 
-WALKS, ROOMS, SPARE, WRITERS = 2, 4, 6, 3
-"""Walks through a house; most rooms of each; times as many questions as are wanted that are drawn; people who ask."""
+WALKS, CHANGES, ROOMS, SPARE, WRITERS = 2, 2, 4, 6, 3
+"""Walks through a house; its rooms that are visited twice; most rooms of each walk; times as many questions as are
+wanted that are drawn; people who ask."""
+WORTH_MOVING, MOVED_BY = (0.3, 1.2), 1.0
+"""Longest side of what is moved between two visits, and how far it is moved and ends from the camera, metres."""
 
 
 @dataclass(frozen=True)
@@ -80,12 +90,18 @@ def film_house(which: tuple[str, int], config: VqaConfig, folder: Path, cache: P
     seed = config.seeds[which[1]] if config.seeds else config.seed
     house, graph = make_dataset_house(seed, name, HouseConfig(area=config.area), catalogue)
     rng, pictures = stream(seed, "vqa", name), parse_pictures(config.pictures)
+    house = lived_in(house, graph, catalogue, rng)
     with drafts(home.parent) as private, World(house, catalogue, graph, cache, pictures) as world:
+        views = {p.id: view_of(world, p) for p in house.placements if p.object_class == CLASS}
         for k in range(WALKS):
             path, stops = tour(house, graph, ROOMS, rng=rng)
             track, to = cameras(graph, path, stops, rng.uniform(-np.pi, np.pi)), private / name / f"walk_{k}"
             rooms = tuple(graph.room_of_node[n] for n in stops)
-            walk = Walk(f"{name}_{k}", name, rooms, tuple(film(world, [*track], to)))
+            walk = Walk(f"{name}_{k}", name, rooms, tuple(film(world, [*track], to)), views=views)
+            write_json(to / "walk.json", dataclasses.asdict(walk))
+        for k, node in enumerate(stops[:CHANGES], WALKS):
+            to = private / name / f"walk_{k}"
+            walk = two_visits(world, node, to, f"{name}_{k}", rng)
             write_json(to / "walk.json", dataclasses.asdict(walk))
         house.save(private / name / "house.json")
         to_matterport(graph, house, private / name / "connectivity.json")
@@ -93,12 +109,43 @@ def film_house(which: tuple[str, int], config: VqaConfig, folder: Path, cache: P
     return name
 
 
+def lived_in(house: House, graph: NavGraph, catalogue: Catalogue, rng: np.random.Generator) -> House:
+    """The house with somebody in most rooms, and with doors and drawers left open by an untidy household."""
+    untidy = dataclasses.replace(house, disorder=1.0)
+    met = place_people(house, graph, catalogue, seed=house.seed)
+    rooms = {graph.room_of_node[n]: n for n in rng.permutation(sorted(met)).tolist()}
+    return add_people(left_open(untidy, catalogue).applied(house), met, rooms.values())
+
+
+def two_visits(world: World, node: int, to: Path, name: str, rng: np.random.Generator) -> Walk:
+    """Film two looks around at a node, with something moved in its room between them; nothing where nothing can be."""
+    eye, room = world.graph.positions[node], world.graph.room_of_node[node]
+    track = look_around(eye, rng.uniform(-np.pi, np.pi))
+    frames = [*film(world, track, to)]
+    floor = world.house.floor(world.house.room_by_id[room])
+    low, high = np.reshape(floor.bounds, (2, 2))
+    can = sorted(loose(world.house, world.catalogue))
+    moved = [p for p in map(world.house.placement_by_id.get, can) if p and p.room == room and p.parent is None]
+    of_weight = lambda p: WORTH_MOVING[0] < max(p.size) < WORTH_MOVING[1] and p.object_class not in OPENING_CLASSES
+    moved = [p for p in moved if of_weight(p) and any(p.id in f.clear for f in frames)]
+    for p in rng.permutation(np.array(moved, dtype=object)).tolist():
+        for spot in rng.uniform(low, high, (100, 2)):
+            body, apart = max(p.size[:2]) / 2, (math.dist(spot, at) for at in (p.position[:2], eye[:2]))
+            around = [world.is_free(spot + body * np.array([math.cos(a), math.sin(a)])) for a in np.arange(0, 6, 1.0)]
+            if min(apart) > MOVED_BY and all(around) and floor.contains(shapely.Point(spot)):
+                world.move(p.id, (*spot, p.position[2]), p.yaw)
+                frames += film(world, track, to, len(frames))
+                world.undo()
+                return Walk(name, world.name, (room,), tuple(frames), moved=p.id)
+    return Walk(name, world.name, (room,), tuple(frames))
+
+
 def scenes_of(folder: Path, split: str, houses: int, cache: Path) -> list[WalkScene]:
     """All walks of a split, each with the classes that those of other houses show."""
     scenes, catalogue = list[WalkScene](), load_catalogue(cache)
     for home in (folder / "houses" / f"{split}_{i:04d}" for i in range(houses)):
         house, graph = House.load(home / "house.json"), from_matterport(home / "connectivity.json")
-        walks = [from_plain(Walk, read_json(home / f"walk_{k}" / "walk.json")) for k in range(WALKS)]
+        walks = [from_plain(Walk, read_json(file)) for file in sorted(home.glob("walk_*/walk.json"))]
         scenes += [WalkScene(walk, house, graph, catalogue) for walk in walks]
     shown = [(s.house.name, name) for s in scenes for name in sorted({p.object_class for p in s.things})]
     for scene in scenes:
@@ -120,7 +167,8 @@ def ask(config: VqaConfig, scenes: Sequence[WalkScene], wanted: int, workers: in
 def asked_about(scene: WalkScene, most: int, seed: int) -> list[VqaQuestion]:
     """Up to so many questions of every type about a walk, in the words of several people."""
     questions: dict[tuple[str, ...], VqaQuestion] = {}
-    for name, writer in itertools.product(TYPES, range(WRITERS)):
+    types = [name for name in TYPES if (name == CHANGE) == (scene.walk.moved is not None)]
+    for name, writer in itertools.product(types, range(WRITERS)):
         s = scene.asked(name, stream(seed, "questions", scene.walk.name, name, writer))
         for q in itertools.islice(TYPES[name](s), -(-most // WRITERS)):
             number = f"{scene.walk.name}_{name}_{len(questions)}"

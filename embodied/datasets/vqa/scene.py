@@ -14,8 +14,10 @@ from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import read_toml
 from embodied.datasets.vqa.scoring import VqaQuestion
 from embodied.datasets.vqa.walks import GLIMPSE, Walk
-from embodied.geometry import wrap
+from embodied.generate.people import CLASS
+from embodied.geometry import rotation, wrap
 from embodied.house.house import House, Placement
+from embodied.house.moment import apart
 from embodied.house.shapes import footprint
 from embodied.language import templates
 from embodied.language.clauses import Referent
@@ -26,6 +28,13 @@ from embodied.navigation.graph import NavGraph
 ASKING: Mapping[str, Any] = read_toml(Path(templates.__file__).with_name("vqa.toml"))
 """Type to habit to templates; and 'alike', groups of classes that people do not tell apart."""
 ALIKE: Mapping[str, list[str]] = {name: group for group in ASKING["alike"] for name in group}
+
+
+PEOPLE = (
+    {"child": "child", "female": "woman", "male": "man"},
+    {"standing": "standing", "sitting": "sitting", "sitting_floor": "sitting"},
+)
+"""Words for people, and for what they do, by a tag of theirs."""
 
 
 class WalkScene:
@@ -42,9 +51,17 @@ class WalkScene:
         self.clear = _firsts(f.clear for f in walk.frames)
         self.glimpsed = _firsts([o for o, share in f.shares.items() if share >= GLIMPSE] for f in walk.frames)
         self.things = [p for p in house.placements if p.id in self.clear and p.object_class not in UNFIT]
+        fronts = ((p, apart(catalogue.mesh, p)) for p in self.things if self._faced(p))
+        self.openable = [p for p, whole in fronts if whole and any(m.kind != "lid" for m in whole.moving)]
         kinds = [r.kind for r in house.rooms]
         self.rooms = {r.id: r.kind for r in house.rooms if kinds.count(r.kind) == 1}
         self.looked_at = [r for r in dict.fromkeys(walk.rooms) if r in self.rooms]
+
+    def _faced(self, p: Placement) -> bool:
+        """True if a frame that shows a thing clearly was taken from before it."""
+        front = rotation(p.yaw) @ (0.0, -1.0)
+        cameras = (f.position for f in self.walk.frames if p.id in f.clear)
+        return any(front @ np.subtract(c[:2], p.position[:2]) > 0.5 * math.dist(c[:2], p.position[:2]) for c in cameras)
 
     def asked(self, kind: str, rng: np.random.Generator) -> WalkScene:
         """The scene for somebody drawn who asks questions of a type."""
@@ -103,6 +120,22 @@ class WalkScene:
                 return f"the {word} in the {self.room_name(p.room)}"
         return None
 
+    def people(self, anywhere: bool = False) -> list[tuple[Placement, str]]:
+        """People who are seen clearly, with names that fit nobody else: 'the sitting woman', 'the man in the kitchen'.
+
+        Args:
+          anywhere: names do not say the room.
+        """
+        shown = [p for p in self.house.placements if p.object_class == CLASS and p.id in self.glimpsed]
+        names: dict[str, list[str]] = {}
+        for p in shown:
+            who, how = (next((w for t, w in words.items() if t in self.assets[p.id].tags), "") for words in PEOPLE)
+            there = [f"the {who} in the {self.room_name(p.room)}"] if p.room in self.rooms and not anywhere else []
+            names[p.id] = [f"the {who}", f"the {how} {who}", *there] if who and how else []
+        said = [name for of_one in names.values() for name in of_one]
+        alone = ((p, [n for n in names[p.id] if said.count(n) == 1]) for p in shown if p.id in self.clear)
+        return self.shuffled([(p, of_one[0]) for p, of_one in alone if of_one])
+
     def meant(self, words: str) -> list[Placement]:
         """Placements that a reader takes words for, of all that the walk shows."""
         thing = self.lexicon.heard(words.split())
@@ -116,7 +149,7 @@ def _firsts(frames: Iterable[Iterable[str]]) -> dict[str, int]:
     return first
 
 
-def apart(a: Placement, b: Placement) -> float:
+def gap(a: Placement, b: Placement) -> float:
     """Metres between the nearest points of two boxes."""
     low, high = sorted((a, b), key=lambda p: p.position[2])
     return math.hypot(footprint(a).distance(footprint(b)), max(high.position[2] - low.position[2] - low.size[2], 0.0))

@@ -1,28 +1,46 @@
 """The types of questions: one table, a function each, which yields questions about a walk and leaves out what is
-ambiguous, by the margins below. Words are in embodied/language/vqa.toml. Nine are VSI-Bench's, in its units
+ambiguous, by the margins below. Words are in embodied/language/vqa.toml. Ten are VSI-Bench's, in its units
 (Yang et al. 2025, "Thinking in Space", sec. 3.2).
 """
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
 
-from embodied.datasets.vqa.scene import ALIKE, WalkScene, apart, bearing, direction, middle
+import numpy as np
+import shapely
+
+from embodied.assets.moving_parts import openness_of
+from embodied.datasets.vqa.scene import ALIKE, WalkScene, bearing, direction, gap, middle
 from embodied.datasets.vqa.scoring import VqaQuestion
-from embodied.house.house import Placement
+from embodied.datasets.vqa.walks import CLEAR_SHARE
+from embodied.geometry import facing_of
+from embodied.house.house import HINGED, Placement
+from embodied.house.shapes import footprint, inward
 from embodied.language.lexicon import UNFIT
 from embodied.language.plain_language import plural
+from embodied.light.tracing.sky import sun_direction
 
 SIDE = 15.0
 """Degrees from the border between two sides within which nothing is asked."""
 LEAST_METRES, MOST_METRES, NEARER, NEARER_METRES = 0.5, 8.0, 1.25, 0.3
 """Between things whose distance is asked for; how much farther the second nearest thing is than the nearest."""
+AJAR, BEHIND = 0.3, 110.0
+"""Openness from which a door or drawer stands open; degrees off their way from which people do not see things."""
+SUNNY, SHADY, HIGH, LATER = math.cos(math.radians(50)), math.cos(math.radians(100)), 0.15, (8.0, 18.0)
+"""Cosines between where a window looks and the sun, at least of a sunny room and at most of others; the least height of
+the sun, the sine; hours that are asked about."""
+STANDS, CORNER, STRAIGHT, ROUTES = 1.2, 60.0, 25.0, 400
+"""Metres within which one is at a thing; degrees from which a bend of a way is a turn, and below which it is none;
+ways of a walk that are looked at."""
 Sides = dict[str, tuple[float, float]]
 """Degrees to the left, from and to."""
 TWO_SIDES: Sides = {"left": (0, 180), "right": (-180, 0)}
 LEFT_RIGHT_BACK: Sides = {"left": (0, 135), "right": (-135, 0), "back": (135, 225)}
+FOUR_SIDES: Sides = {"straight on": (-45, 45), "left": (45, 135), "back": (135, 225), "right": (-135, -45)}
 QUARTERS: Sides = {"front-left": (0, 90), "back-left": (90, 180), "back-right": (-180, -90), "front-right": (-90, 0)}
 Asked = Iterator[VqaQuestion]
 QuestionType = Callable[[WalkScene], Asked]
@@ -60,13 +78,13 @@ def counting(s: WalkScene) -> Asked:
 
 def distance(s: WalkScene) -> Asked:
     for (a, first), (b, second) in groups(s, 2):
-        if LEAST_METRES <= (metres := apart(a, b)) <= MOST_METRES:
+        if LEAST_METRES <= (metres := gap(a, b)) <= MOST_METRES:
             yield s.ask(f"{metres:.1f}", (a.id, b.id), a=first, b=second)
 
 
 def nearest(s: WalkScene) -> Asked:
     for (a, first), *others in groups(s, 5):
-        metres, ids, names = zip(*sorted((apart(a, p), p.id, name) for p, name in others))
+        metres, ids, names = zip(*sorted((gap(a, p), p.id, name) for p, name in others))
         if metres[1] > max(NEARER * metres[0], metres[0] + NEARER_METRES):
             yield s.ask(names[0], (a.id, *ids), names[1:], ", ".join(f"{d:.1f} m" for d in metres), a=first)
 
@@ -136,6 +154,101 @@ def carried(shelf: bool) -> QuestionType:
     return asked
 
 
+def openness(s: WalkScene) -> Asked:
+    wide = {p.id: max(openness_of(p.params).values(), default=0.0) for p in s.openable}
+    shut = [p for p in s.openable if not wide[p.id]]
+    for p, name in s.named([p for p in s.openable if wide[p.id] > AJAR]):
+        wrong = s.named(shut)[:3]
+        if len(wrong) == 3:
+            about = (p.id, *(q.id for q, _ in wrong))
+            yield s.ask(name, about, [n for _, n in wrong], f"open by {wide[p.id]:.2f}")
+
+
+def change(s: WalkScene) -> Asked:
+    half = len(s.walk.frames) // 2
+    twice = {i for f in s.walk.frames[:half] for i in f.clear} & {i for f in s.walk.frames[half:] for i in f.clear}
+    others = [p for p in s.things if p.id in twice and p.id != s.walk.moved and p.parent != s.walk.moved]
+    for p, name in s.named([p for p in s.things if p.id == s.walk.moved and p.id in twice]):
+        wrong = s.named([q for q in others if q.parent is None])[:3]
+        if len(wrong) == 3:
+            yield s.ask(name, (p.id, *(q.id for q, _ in wrong)), [n for _, n in wrong])
+
+
+def whereabouts(s: WalkScene) -> Asked:
+    for p, name in s.people(anywhere=True):
+        wrong = [s.room_name(r) for r in s.shuffled(s.looked_at) if r != p.room][:3]
+        if p.room in s.looked_at and len(wrong) > 1:
+            yield s.ask(s.room_name(p.room), (p.id,), wrong, a=name)
+
+
+def seen_by(s: WalkScene) -> Asked:
+    for p, name in s.people():
+        here, seen = s.in_room(p.room), s.walk.views.get(p.id, {})
+        behind = [t for t in here if t.id not in seen and abs(bearing(middle(p), facing_of(p.yaw), middle(t))) > BEHIND]
+        wrong = s.named(behind)[:3]
+        for t, right in s.named([t for t in here if seen.get(t.id, 0.0) > CLEAR_SHARE])[: len(wrong) > 1]:
+            yield s.ask(right, (p.id, t.id, *(q.id for q, _ in wrong)), [n for _, n in wrong], a=name)
+
+
+def side_of_person(s: WalkScene) -> Asked:
+    for p, name in s.people():
+        for t, thing in s.named(s.in_room(p.room)):
+            angle = bearing(middle(p), facing_of(p.yaw), middle(t))
+            if math.dist(middle(p), middle(t)) > LEAST_METRES:
+                yield from sided(s, angle, TWO_SIDES, (p.id, t.id), a=name, b=thing)
+
+
+def sun(s: WalkScene) -> Asked:
+    """The room whose window looks at the sun at another hour; into the others it cannot shine."""
+    for hour in LATER:
+        towards = sun_direction(dataclasses.replace(s.house.sky, hour=hour))
+        of_room: dict[str, list[float]] = {r: [SHADY - 1] for r in s.looked_at}
+        for o in s.house.openings:
+            if o.rooms[1] is None and o.rooms[0] in of_room and o.kind not in HINGED:
+                of_room[o.rooms[0]].append(float(-inward(s.house, o) @ towards[:2] / math.hypot(*towards[:2])))
+        shady = [r for r, cosines in of_room.items() if max(cosines) < SHADY]
+        sunny = [r for r, cosines in of_room.items() if max(cosines) > SUNNY]
+        if len(sunny) == 1 and len(shady) > 1 and towards[2] > HIGH and s.house.sky.weather != "overcast":
+            slots = {"now": f"{s.house.sky.hour:.0f}", "hour": f"{hour:.0f}"}
+            yield s.ask(s.room_name(sunny[0]), sunny, [s.room_name(r) for r in shady[:3]], f"of {of_room}", **slots)
+
+
+def next_step(s: WalkScene) -> Asked:
+    """Which way somebody sets off who stands where the video ends, and looks as its last frame does."""
+    last, spots = s.walk.frames[-1], s.graph.positions
+    here = int(np.argmin(np.linalg.norm(spots - last.position, axis=1)))
+    for t, name in s.named([t for t in s.things if t.room != s.graph.room_of_node[here]]):
+        goals = [n for n, room in enumerate(s.graph.room_of_node) if room == t.room]
+        way = s.graph.path(here, min(goals, key=lambda n: math.dist(spots[n, :2], middle(t))))
+        angle = bearing(spots[here, :2], last.yaw, spots[way[1], :2])
+        yield from sided(s, angle, FOUR_SIDES, (t.id,), a=name)
+
+
+def route(s: WalkScene) -> Asked:
+    """Turns on a way of two or three straight legs, with things to stop at."""
+    spots = s.graph.positions[:, :2]
+    at = {n: [t for t in s.things if footprint(t).distance(shapely.Point(xy)) < STANDS] for n, xy in enumerate(spots)}
+    ends = [n for n, room in enumerate(s.graph.room_of_node) if at[n] and room in s.walk.rooms]
+    for way in (s.graph.path(*pair) for pair in s.shuffled([*itertools.permutations(ends, 2)])[:ROUTES]):
+        bends = [
+            (b, bearing(spots[b], direction(spots[a], spots[b]), spots[c])) for a, b, c in zip(way, way[1:], way[2:])
+        ]
+        turns = [(n, angle) for n, angle in bends if abs(angle) >= STRAIGHT]
+        stops = [thing for n in (way[0], *(n for n, _ in turns), way[-1]) for thing in s.named(at[n])[:1]]
+        if not 1 <= len(turns) <= 2 or min(abs(angle) for _, angle in turns) < CORNER:
+            continue
+        if len({t.id for t, _ in stops}) < len(turns) + 2:
+            continue
+        names = [name for _, name in stops]
+        steps = "; [fill in]; ".join(f"go forward until you reach {name}" for name in names[1:])
+        right = ", ".join("turn left" if angle > 0 else "turn right" for _, angle in turns)
+        every = (", ".join(x) for x in itertools.product(("turn left", "turn right"), repeat=len(turns)))
+        slots = {"a": names[0], "b": names[1], "c": names[-1], "steps": f"{steps}."}
+        yield s.ask(right, [t.id for t, _ in stops], [x for x in every if x != right], **slots)
+
+
+CHANGE = "change"
+"""The type that is asked about two visits."""
 TYPES: dict[str, QuestionType] = {
     "object_counting": counting,
     "object_abs_distance": distance,
@@ -149,4 +262,12 @@ TYPES: dict[str, QuestionType] = {
     "visibility": visibility,
     "support": carried(shelf=False),
     "containment": carried(shelf=True),
+    "route_planning": route,
+    "next_step": next_step,
+    "openness": openness,
+    CHANGE: change,
+    "person_room": whereabouts,
+    "person_view": seen_by,
+    "person_side": side_of_person,
+    "sun": sun,
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import cv2
@@ -13,7 +13,7 @@ import shapely
 
 from embodied.assets.cache import write_bytes
 from embodied.assets.decoding import read_picture
-from embodied.geometry import rectangle, wrap
+from embodied.geometry import facing_of, rectangle, wrap
 from embodied.house.house import House, Placement
 from embodied.navigation.graph import NavGraph
 from embodied.records import RecordError
@@ -28,6 +28,8 @@ CLEAR_SHARE, LARGE, WHOLE, GLIMPSE = 0.004, 0.04, 0.25, 0.0003
 """An object counts as seen if some frame gives it CLEAR_SHARE of its pixels and does not cut it off (or LARGE of them),
 and at least WHOLE of the outline of its box shows it. With less than GLIMPSE in all frames it counts as unseen. No
 question is about what lies between."""
+EYES = 0.93
+"""Height of people's eyes, of their height as they stand or sit."""
 Camera = tuple[np.ndarray, float]
 """(3,) position, metres, and yaw, radians."""
 
@@ -44,12 +46,15 @@ class WalkFrame:
 
 @dataclass(frozen=True)
 class Walk:
-    """walk.json: a walk through `rooms`, with a look around in each."""
+    """walk.json: a walk through `rooms`, with a look around in each; or two looks around in one, between which `moved`
+    was moved. `views` are what people see who stand or sit in the house: shares of a picture from their eyes."""
 
     name: str
     house: str
     rooms: tuple[str, ...]
     frames: tuple[WalkFrame, ...]
+    moved: str | None = None
+    views: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 def tour(house: House, graph: NavGraph, rooms: int, *, rng: np.random.Generator) -> tuple[list[int], list[int]]:
@@ -79,15 +84,30 @@ def cameras(graph: NavGraph, path: Sequence[int], stops: Sequence[int], yaw: flo
             yield from ((here, float(wrap(yaw + wrap(ahead - yaw) * i / turns))) for i in range(1, turns))
             steps, yaw = math.ceil(float(np.linalg.norm(there - here)) / STRIDE), ahead
             yield from ((here + (there - here) * i / steps, yaw) for i in range(1, steps))
-        here, looks = there, round(2 * math.pi / TURN) if node in todo[:1] else 1
-        todo = todo[looks > 1 :]
-        yield from ((here, float(wrap(yaw + i * TURN))) for i in range(looks))
+        here, stays = there, node in todo[:1]
+        todo = todo[stays:]
+        yield from look_around(here, yaw) if stays else [(here, yaw)]
 
 
-def film(world: World, track: Sequence[Camera], folder: Path) -> Iterator[WalkFrame]:
-    """Draw the frames of a walk into `folder`: NNN.jpg, and NNN.png with instance ids of 16 bits."""
-    things = world.house.placement_by_id
-    for k, (position, yaw) in enumerate(track):
+def look_around(position: np.ndarray, yaw: float) -> list[Camera]:
+    """The cameras of a turn on the spot that begins at `yaw`."""
+    return [(position, float(wrap(yaw + i * TURN))) for i in range(round(2 * math.pi / TURN))]
+
+
+def view_of(world: World, person: Placement) -> dict[str, float]:
+    """Shares of what somebody sees who looks ahead, of a picture 96 degrees wide; nothing where the own body is in it."""
+    ahead = facing_of(person.yaw)
+    reach, height = person.size[1] / 2 + 0.05, person.position[2] + EYES * person.size[2]
+    eye = (person.position[0] + reach * math.cos(ahead), person.position[1] + reach * math.sin(ahead), height)
+    view = world.camera(eye, ahead, math.radians(-12), math.radians(80), (120, 160))
+    shares = shares_of(world, view.ids)
+    return shares if person.id not in shares else {}
+
+
+def film(world: World, track: Sequence[Camera], folder: Path, first: int = 0) -> Iterator[WalkFrame]:
+    """Draw frames of a walk into `folder`, from number `first`: NNN.jpg, and NNN.png with instance ids of 16 bits."""
+    things = {p.id: p for p in world.moment.applied(world.house).placements}
+    for k, (position, yaw) in enumerate(track, first):
         view = world.camera(position, yaw, *LENS)
         pictures = {"jpg": view.rgb[..., ::-1], "png": view.ids.astype(np.uint16)}
         for kind, picture in pictures.items():
