@@ -17,7 +17,7 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.cli import main
 from embodied.datasets.vqa.build import VqaData, asked_about
 from embodied.datasets.vqa.scene import WalkScene
-from embodied.datasets.vqa.scoring import BLIND, VqaQuestion, accuracy, chance, cross_judged, score, thinned
+from embodied.datasets.vqa.scoring import BLIND, LETTERS, VqaQuestion, accuracy, chance, cross_judged, score, thinned
 from embodied.datasets.vqa.types import TYPES
 from embodied.datasets.vqa.walks import CLEAR_SHARE, Walk, WalkFrame
 from embodied.house.house import House, Placement
@@ -35,7 +35,7 @@ THINGS = {
 }
 
 
-def scene(clear=None, second_sofa=False) -> WalkScene:
+def scene(clear=None, second_sofa=False, person=None) -> WalkScene:
     """A walk through the two rooms that shows all of their things, clearly or some of them not."""
     catalogue, house = load_catalogue(None), two_rooms()
     spots = [(f"{name}_1", at) for name, at in THINGS.items()] + [("sofa_2", (6, 1))] * second_sofa
@@ -44,6 +44,7 @@ def scene(clear=None, second_sofa=False) -> WalkScene:
         room = "living_room_1" if x < 5 else "bedroom_1"
         p = Placement(name, asset.key, name[:-2], room, (float(x), float(y), 0.0), 0.0, asset.size)
         house = dataclasses.replace(house, placements=(*house.placements, p))
+    house = dataclasses.replace(house, placements=(*house.placements, *([person] if person else [])))
     ids = [p.id for p in house.placements]
     frame = WalkFrame((2.5, 2.0, 1.5), 0.0, dict.fromkeys(ids, 0.02), tuple(ids if clear is None else clear))
     walk = Walk("hand_0000_0", "hand_0000", ("living_room_1", "bedroom_1"), (frame,) * 3)
@@ -73,6 +74,15 @@ def test_answers_follow_from_where_things_are(hand):
             assert int(q.answer) == round(100 * max(place[q.about[0]].size))
         elif q.type == "room_size_estimation":
             assert float(q.answer) == pytest.approx({"living_room_1": 18.9, "bedroom_1": 15.1}[q.about[0]], abs=0.1)
+
+
+def test_people_have_a_left_and_right_of_their_own():
+    people = load_catalogue(None).of_class("person")
+    key = next(a.key for a in people if {"male", "standing"} <= {*a.tags})
+    man = Placement("person_1", key, "person", "living_room_1", (2.5, 0.6, 0.0), math.pi, (0.6, 0.4, 1.8))
+    asked = [q for q in asked_about(scene(person=man), 60, seed=0) if q.type == "person_side"]
+    answers = {q.about[1]: q.answer for q in asked}  # he looks along y
+    assert answers["sofa_1"] == "left" and answers["armchair_1"] == "right" and "the man" in asked[0].text
 
 
 def test_no_question_is_about_what_is_only_glimpsed():
@@ -153,11 +163,21 @@ def test_the_command_makes_questions_about_what_the_frames_show(tmp_path, capsys
     ]
     assert main(["view", data, "--episode", "0"]) == 0
     assert cv2.imread(f"{data}/sheets/0.png").shape[1] == 4 * 480
-    for form in ("vsi", "llava"):
+    for form in ("vsi", "llava", "sat", "openeqa"):
         assert main(["export", "vqa", "--data", data, "--out", str(tmp_path / form), "--form", form]) == 0
     rows = pq.read_table(tmp_path / "vsi/test.parquet").to_pylist()
     assert [r["ground_truth"] for r in rows] == [q.letter for q in questions]
     film = cv2.VideoCapture(str(tmp_path / f"vsi/vsibench/embodied/{rows[0]['scene_name']}.mp4"))
     assert film.get(cv2.CAP_PROP_FRAME_COUNT) == len([*(home / f"walk_{rows[0]['scene_name'][-1]}").glob("*.jpg")])
+    facts = json.loads((tmp_path / "vsi/meta_info_test.json").read_text())[rows[0]["scene_name"]]["object_bbox"]
+    beds = [p for p in House.load(home / "house.json").placements if p.object_class == "bed"]
+    assert [b["centroid"][:2] for b in facts["bed"]] == [list(p.position[:2]) for p in beds]
+    choices = [q for q in questions if q.options]
+    sat = pq.read_table(tmp_path / "sat/test.parquet").to_pylist()
+    right = [r["answers"][LETTERS.index(q.letter)] for r, q in zip(sat, choices, strict=True)]
+    assert right == [q.answer for q in choices] == [r["correct_answer"] for r in sat]
+    assert len(sat[0]["image_bytes"]) == 8
+    history = json.loads((tmp_path / "openeqa/open-eqa-test.json").read_text())[0]["episode_history"]
+    assert [*(tmp_path / "openeqa/frames" / history).glob("*-rgb.png")]
     said = json.loads((tmp_path / "llava/test.jsonl").read_text().splitlines()[0])["conversations"]
     assert said[0]["value"].startswith("<image>") and said[1]["value"] == questions[0].letter

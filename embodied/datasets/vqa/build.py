@@ -17,7 +17,6 @@ import shapely
 
 from embodied.assets.cache import digest, drafts, write_json
 from embodied.assets.catalogue import Catalogue, load_catalogue
-from embodied.assets.moving_parts import OPENING_CLASSES
 from embodied.datasets.build import Watch, for_each_unit, make_dataset_house
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.vqa.scene import WalkScene
@@ -40,8 +39,10 @@ from embodied.world import World
 WALKS, CHANGES, ROOMS, SPARE, WRITERS = 2, 2, 4, 6, 3
 """Walks through a house; its rooms that are visited twice; most rooms of each walk; times as many questions as are
 wanted that are drawn; people who ask."""
-WORTH_MOVING, MOVED_BY = (0.3, 1.2), 1.0
-"""Longest side of what is moved between two visits, and how far it is moved and ends from the camera, metres."""
+EASILY_MOVED = ("chair", "stool", "plant", "basket", "box", "bag", "table", "toy", "horse", "suitcase", "stand", "bin")
+LEAST_MOVED, MOVED_BY = 0.3, 1.0
+"""Parts of the names of classes of what is moved between two visits, its longest side at least, and how far it is moved
+and ends from the camera, metres."""
 
 
 @dataclass(frozen=True)
@@ -126,8 +127,8 @@ def two_visits(world: World, node: int, to: Path, name: str, rng: np.random.Gene
     low, high = np.reshape(floor.bounds, (2, 2))
     can = sorted(loose(world.house, world.catalogue))
     moved = [p for p in map(world.house.placement_by_id.get, can) if p and p.room == room and p.parent is None]
-    of_weight = lambda p: WORTH_MOVING[0] < max(p.size) < WORTH_MOVING[1] and p.object_class not in OPENING_CLASSES
-    moved = [p for p in moved if of_weight(p) and any(p.id in f.clear for f in frames)]
+    light = (p for p in moved if any(word in p.object_class for word in EASILY_MOVED) and max(p.size) > LEAST_MOVED)
+    moved = [p for p in light if any(p.id in f.clear for f in frames)]
     for p in rng.permutation(np.array(moved, dtype=object)).tolist():
         for spot in rng.uniform(low, high, (100, 2)):
             body, apart = max(p.size[:2]) / 2, (math.dist(spot, at) for at in (p.position[:2], eye[:2]))

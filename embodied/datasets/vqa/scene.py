@@ -132,8 +132,8 @@ class WalkScene:
             who, how = (next((w for t, w in words.items() if t in self.assets[p.id].tags), "") for words in PEOPLE)
             there = [f"the {who} in the {self.room_name(p.room)}"] if p.room in self.rooms and not anywhere else []
             names[p.id] = [f"the {who}", f"the {how} {who}", *there] if who and how else []
-        said = [name for of_one in names.values() for name in of_one]
-        alone = ((p, [n for n in names[p.id] if said.count(n) == 1]) for p in shown if p.id in self.clear)
+        every = [name for of_one in names.values() for name in of_one]
+        alone = ((p, [n for n in names[p.id] if every.count(n) == 1]) for p in shown if p.id in self.clear)
         return self.shuffled([(p, of_one[0]) for p, of_one in alone if of_one])
 
     def meant(self, words: str) -> list[Placement]:

@@ -30,7 +30,7 @@ LEAST_METRES, MOST_METRES, NEARER, NEARER_METRES = 0.5, 8.0, 1.25, 0.3
 """Between things whose distance is asked for; how much farther the second nearest thing is than the nearest."""
 AJAR, BEHIND = 0.3, 110.0
 """Openness from which a door or drawer stands open; degrees off their way from which people do not see things."""
-SUNNY, SHADY, HIGH, LATER = math.cos(math.radians(50)), math.cos(math.radians(100)), 0.15, (8.0, 18.0)
+SUNNY, SHADY, HIGH, LATER = math.cos(math.radians(50)), math.cos(math.radians(100)), 0.15, (7.0, 9.0, 15.0, 17.0, 19.0)
 """Cosines between where a window looks and the sun, at least of a sunny room and at most of others; the least height of
 the sun, the sine; hours that are asked about."""
 STANDS, CORNER, STRAIGHT, ROUTES = 1.2, 60.0, 25.0, 400
@@ -208,9 +208,9 @@ def sun(s: WalkScene) -> Asked:
                 of_room[o.rooms[0]].append(float(-inward(s.house, o) @ towards[:2] / math.hypot(*towards[:2])))
         shady = [r for r, cosines in of_room.items() if max(cosines) < SHADY]
         sunny = [r for r, cosines in of_room.items() if max(cosines) > SUNNY]
-        if len(sunny) == 1 and len(shady) > 1 and towards[2] > HIGH and s.house.sky.weather != "overcast":
+        if len(sunny) == 1 and shady and towards[2] > HIGH and s.house.sky.weather != "overcast":
             slots = {"now": f"{s.house.sky.hour:.0f}", "hour": f"{hour:.0f}"}
-            yield s.ask(s.room_name(sunny[0]), sunny, [s.room_name(r) for r in shady[:3]], f"of {of_room}", **slots)
+            yield s.ask(s.room_name(sunny[0]), sunny, [s.room_name(r) for r in shady[:3]], **slots)
 
 
 def next_step(s: WalkScene) -> Asked:

@@ -95,7 +95,7 @@ def look_around(position: np.ndarray, yaw: float) -> list[Camera]:
 
 
 def view_of(world: World, person: Placement) -> dict[str, float]:
-    """Shares of what somebody sees who looks ahead, of a picture 96 degrees wide; nothing where the own body is in it."""
+    """Shares of what somebody sees who looks ahead, of a picture 96 degrees wide; nothing if the own body is in it."""
     ahead = facing_of(person.yaw)
     reach, height = person.size[1] / 2 + 0.05, person.position[2] + EYES * person.size[2]
     eye = (person.position[0] + reach * math.cos(ahead), person.position[1] + reach * math.sin(ahead), height)
