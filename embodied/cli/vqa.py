@@ -57,8 +57,10 @@ def evaluate(args: EvaluateOptions) -> None:
 
     if args.data is None:
         raise ValueError("questions need --data, a folder that `embodied dataset vqa` built")
-    if unknown := sorted({*args.agent} - {"llm", "blind"}):
-        raise ValueError(f"unknown agents {unknown}; questions are answered by llm and blind (models that see nothing)")
+    if unknown := sorted({*args.agent} - {"llm", "blind", "judge"}):
+        raise ValueError(
+            f"unknown agents {unknown}; questions are answered by llm, judge and blind (models without sight)"
+        )
     data = VqaData(args.data)
     split = args.split[0] if args.split else [*data.about["counts"]][-1]
     questions = data.questions(split)
@@ -69,10 +71,13 @@ def evaluate(args: EvaluateOptions) -> None:
         if few := [t for t, qs in of.items() if len(qs) < 2]:
             raise ValueError(f"blind models learn from half of a type's questions, and {few} have one; raise --tasks")
         columns |= {m: [float(cross_judged(m, qs, args.seed + 1)[0].mean()) for qs in of.values()] for m in BLIND}
+    mean_of = lambda scores: [sum(scores[q.id] for q in qs) / len(qs) for qs in of.values()]
+    for name, answers in judged(args, data, questions) if "judge" in args.agent else ():
+        columns[name] = mean_of({q.id: score(q, a) for q, a in zip(questions, answers, strict=True)})
     if "llm" in args.agent:
         answers = [*bar(answered(args, data, questions), "questions", "question", len(questions))]
         scores = {q.id: score(q, answer) for q, answer in zip(questions, answers, strict=True)}
-        columns["llm"] = [sum(scores[q.id] for q in qs) / len(qs) for qs in of.values()]
+        columns["llm"] = mean_of(scores)
         if args.out:
             records = ({"id": q.id, "said": a, "score": scores[q.id]} for q, a in zip(questions, answers))
             save_lines(args.out / "answers.jsonl", records)
@@ -85,6 +90,21 @@ def evaluate(args: EvaluateOptions) -> None:
         write_bytes(args.out / "table.md", table.encode())
         write_json(args.out / "table.json", facts, indent=1)
     show(args, facts, table)
+
+
+def judged(args: EvaluateOptions, data: VqaData, asked: Sequence[VqaQuestion]) -> Iterator[tuple[str, list[str]]]:
+    """Answers of a network that learns from the train split, and of its twin that sees black frames."""
+    from embodied.agents.vision.answers import answers_of, frame_features
+
+    learned = data.questions("train")
+    if shared := {q.walk for q in learned} & {q.walk for q in asked}:
+        raise ValueError(
+            f"the judge learns from the split train, which shows {sorted(shared)[0]} too; judge another split"
+        )
+    walks = sorted({q.walk for q in (*learned, *asked)})
+    seen = frame_features(data.frames, bar(walks, "frames", "walk", len(walks)))
+    for name, frames in {"judge": seen, "judge, blind": {w: x * 0 for w, x in seen.items()}}.items():
+        yield name, answers_of(learned, asked, frames, seed=args.seed)
 
 
 def answered(args: EvaluateOptions, data: VqaData, questions: Sequence[VqaQuestion]) -> Iterator[str]:
