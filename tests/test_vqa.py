@@ -165,7 +165,7 @@ def test_the_command_makes_questions_about_what_the_frames_show(tmp_path, capsys
     assert main(["evaluate", "vqa", "--data", data, "--agent", "judge", "--json"]) == 0
     judged = json.loads(capsys.readouterr().out)["scores"]
     assert judged["judge"] != judged["judge, blind"] and min(judged["judge"]) >= 0
-    assert main(["evaluate", "vqa", "--data", data, "--agent", "judge", "--split", "train"]) == 1
+    assert main(["evaluate", "vqa", "--data", data, "--agent", "judge", "--split", "train"]) == 2
     assert main(["view", data, "--episode", "0"]) == 0
     assert cv2.imread(f"{data}/sheets/0.png").shape[1] == 4 * 480
     for form in ("vsi", "llava", "sat", "openeqa"):
