@@ -289,7 +289,8 @@ def picture(env: HelpEnv, o: Observation) -> np.ndarray:
     """The view along the agent's heading, the plan beside it, the words below."""
     nodes = [env.task.start.node, *(s.next_pose.node for s in env._steps)]
     view = _view(env.world, env.pose)
-    how: dict[str, Any] = {"path": tuple(nodes), "facing": env.pose.yaw, "titles": False}
+    here = env.world.house.room_by_id[env.world.graph.room_of_node[nodes[-1]]].storey
+    how: dict[str, Any] = {"path": tuple(nodes), "facing": env.pose.yaw, "titles": False, "storey": here}
     plan = paint_plan(env.world.house, pixels_per_metre=28, graph=env.world.graph, **how)
     plan = ImageOps.pad(plan.convert("RGB"), PLAN[::-1], Image.Resampling.LANCZOS, "white")
     sheet = Image.new("RGB", (view.width + plan.width, VIEW[0] + WORDS_HEIGHT), "white")

@@ -81,9 +81,12 @@ def paint_plan(
         if o.rooms[0] in ids:
             _draw_opening(sheet, house, o)
     for s in house.stairs:
-        _draw_stair(sheet, s)
+        if ids & {*s.rooms}:
+            _draw_stair(sheet, s)
     if graph is not None:
-        _draw_graph(sheet, graph, path)
+        levels = [-np.inf, *(s.elevation for s in house.storeys[1:]), np.inf]
+        height = graph.positions[:, 2] - 0.75  # of the waist
+        _draw_graph(sheet, graph, path, (levels[storey] <= height) & (height < levels[storey + 1]))
         if path and facing is not None:
             _draw_walker(sheet, graph.positions[path[-1]][:2], facing)
     image = sheet.image.resize(
@@ -97,9 +100,15 @@ def paint_plan(
 
 
 def save_plan(house: House, file: Path, *, pixels_per_metre: float = 48.0, graph: Graph | None = None) -> None:
-    """Write the plan of the ground floor as a PNG, atomically; arguments as for `paint_plan`."""
+    """Write the plans of all storeys, the lowest on the left, as a PNG, atomically; arguments as for `paint_plan`."""
     data = io.BytesIO()
-    paint_plan(house, pixels_per_metre=pixels_per_metre, graph=graph).save(data, format="PNG")
+    plans = [
+        paint_plan(house, storey=k, pixels_per_metre=pixels_per_metre, graph=graph) for k in range(len(house.storeys))
+    ]
+    sheet = Image.new("RGB", (sum(p.width for p in plans), max(p.height for p in plans)), PAPER)
+    for k, plan in enumerate(plans):
+        sheet.paste(plan, (sum(p.width for p in plans[:k]), 0))
+    sheet.save(data, format="PNG")
     write_bytes(Path(file), data.getvalue())
 
 
@@ -299,23 +308,29 @@ def _glyph(sheet: _Sheet, p: Placement, corners: np.ndarray, fill: Colour) -> No
 
 
 def _draw_stair(sheet: _Sheet, stair: Stair) -> None:
-    path = np.asarray(stair.path)[:, :2]
-    line = shapely.LineString(path)
-    for k in range(1, stair.risers):
-        p = np.asarray(line.interpolate(k / stair.risers, normalized=True).coords[0])
-        q = np.asarray(line.interpolate(min(1.0, (k + 0.1) / stair.risers), normalized=True).coords[0])
-        d = (q - p) / max(1e-9, np.linalg.norm(q - p))
-        n = np.array([-d[1], d[0]]) * stair.width / 2
-        sheet.line((p - n, p + n), 0.02, SOFT)
-    sheet.line(path, 0.025, SOFT)
+    """Its steps, and an arrow along it that points up."""
+    path = np.asarray(stair.path)
+    rise = (path[-1, 2] - path[0, 2]) / stair.risers
+    for a, b in itertools.pairwise(path):
+        n, way = round((b[2] - a[2]) / rise), (b - a)[:2]
+        side = np.array([-way[1], way[0]]) / np.linalg.norm(way) * stair.width / 2
+        for p in (a[:2] + k / (n - 1) * way for k in range(n) if n > 1):
+            sheet.line((p - side, p + side), 0.02, SOFT)
+    sheet.line(path[:, :2], 0.025, SOFT)
+    back = (path[-2] - path[-1])[:2] / np.linalg.norm((path[-2] - path[-1])[:2]) * 0.16
+    for turn in (np.array([[1, -0.6], [0.6, 1]]), np.array([[1, 0.6], [-0.6, 1]])):
+        sheet.line((path[-1, :2], path[-1, :2] + turn @ back), 0.025, SOFT)
 
 
-def _draw_graph(sheet: _Sheet, graph: Graph, path: tuple[int, ...]) -> None:
-    for i, j in graph.edges:
+def _draw_graph(sheet: _Sheet, graph: Graph, path: tuple[int, ...], here: np.ndarray) -> None:
+    """Viewpoints and edges; `here` (n,) bool: those on the storey."""
+    for i, j in graph.edges[here[graph.edges].all(1)]:
         sheet.line((graph.positions[i][:2], graph.positions[j][:2]), 0.025, (196, 118, 88))
     for a, b in itertools.pairwise(path):
-        sheet.line((graph.positions[a][:2], graph.positions[b][:2]), 0.08, (200, 60, 50))
-    for k, p in enumerate(graph.positions):
+        if here[a] and here[b]:
+            sheet.line((graph.positions[a][:2], graph.positions[b][:2]), 0.08, (200, 60, 50))
+    for k in np.flatnonzero(here).tolist():
+        p = graph.positions[k]
         x, y = sheet.xy(p)
         r = (0.11 if k in path else 0.075) * sheet.scale
         sheet.draw.ellipse(

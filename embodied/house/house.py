@@ -164,6 +164,9 @@ class Stair:
     """Centre line from foot to head, metres, world."""
     width: float
     risers: int
+    well: tuple[tuple[float, float], ...] = ()
+    """Corners, counter-clockwise, of the opening in the floor above, metres; below it, nobody walks. Empty: what the
+    flight covers."""
 
 
 @dataclass(frozen=True)
@@ -215,6 +218,10 @@ class House:
     def storey_of(self, room: Room) -> Storey:
         """The storey that a room is on."""
         return self.storeys[room.storey]
+
+    def floor_height(self, opening: Opening) -> float:
+        """z of the floor that an opening is on, metres."""
+        return self.storey_of(self.room_by_id[opening.rooms[0]]).elevation
 
     def floor(self, room: Room) -> shapely.Polygon:
         """Floor between the bare walls of `room`, metres, world."""

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from embodied.geometry import rectangle
-from embodied.house.house import House, Opening, Placement
+from embodied.house.house import House, Opening, Placement, Room, Stair
 
 
 def footprint(placement: Placement) -> shapely.Polygon:
@@ -44,6 +44,20 @@ def _floor(polygon: tuple[tuple[float, float], ...]) -> shapely.Polygon:
     floor = shapely.Polygon(polygon)
     shapely.prepare(floor)
     return floor
+
+
+def well_of(stair: Stair) -> shapely.Polygon:
+    """The opening of a stair in the floor above it, and below what the stair covers, metres, world."""
+    if stair.well:
+        return shapely.Polygon(stair.well)
+    line = shapely.LineString([p[:2] for p in stair.path])
+    return line.buffer(stair.width / 2 + 0.02, cap_style="flat", join_style="mitre")
+
+
+def open_floor(house: House, room: Room) -> shapely.Geometry:
+    """The floor between the walls of a room, without what stairs cover and where they leave it open, metres, world."""
+    wells = [well_of(s) for s in house.stairs if room.id in s.rooms]
+    return house.floor(room).difference(shapely.union_all(wells)) if wells else house.floor(room)
 
 
 def room_union(house: House, storey: int) -> shapely.Geometry:

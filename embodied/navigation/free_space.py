@@ -10,7 +10,7 @@ import shapely
 
 from embodied.house.house import DOORS, House, Opening, Room
 from embodied.house.moment import WIDEST, Moment
-from embodied.house.shapes import footprint, inward
+from embodied.house.shapes import footprint, inward, open_floor
 
 EYE = 1.5
 """Eye height above the floor, metres (Matterport3D's cameras: mean 1.50)."""
@@ -135,4 +135,4 @@ def _floors_and_doorways(house: House, storey: int) -> shapely.Geometry:
     ways = [
         doorway(house, o) for o in house.openings if o.kind in DOORS and o.rooms[1] is not None and o.rooms[0] in ids
     ]
-    return shapely.union_all([*(house.floor(r) for r in rooms), *ways])
+    return shapely.union_all([*(open_floor(house, r) for r in rooms), *ways])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -14,7 +15,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
-from embodied.house.house import DOORS, House, HouseError, Room
+from embodied.house.house import DOORS, House, HouseError, Room, Stair
 from embodied.navigation.free_space import EYE, OPEN_FROM, closed_doors, doors_of_edges, free_floor, opened, sight_floor
 
 AGENT_RADIUS = 0.2
@@ -31,6 +32,8 @@ CROWDED = 0.6
 """Viewpoints closer than this, in units of the wanted spacing, are thinned where they can be."""
 OPENING = 1.0
 """Metres of way that opening or closing a door counts as: it takes about as long as to walk them."""
+BEFORE_STAIRS, LONG_FLIGHT = 0.45, 3.2
+"""Distance of viewpoints from a stair's ends, and length of flights that have one on the way, metres."""
 LONGEST_EDGE = 2.0
 """Longest edge in units of the wanted spacing: 4.5 m; 95 % of Matterport3D's edges are shorter than 5 m."""
 
@@ -187,6 +190,8 @@ def build_graph(house: House, *, spacing: float = 2.25, open_from: float = OPEN_
         edges += [(a + len(positions), b + len(positions)) for a, b in pairs]
         positions += [(x, y, house.storeys[storey].elevation + EYE) for x, y in xy]
         rooms += room
+    for stair in house.stairs:
+        _climb(stair, positions, rooms, edges)
     ids = tuple(f"v{k:03d}" for k in range(len(positions)))
     return with_edge_doors(graph_of(np.round(positions, 4), np.asarray(edges), ids, tuple(rooms)), rest, open_from)
 
@@ -194,6 +199,39 @@ def build_graph(house: House, *, spacing: float = 2.25, open_from: float = OPEN_
 def walkable(house: House, storey: int = 0) -> shapely.Geometry:
     """Area in which the agent's centre may be: the free floor shrunk by its radius."""
     return free_floor(house, storey).buffer(-(AGENT_RADIUS + 0.005), quad_segs=6)
+
+
+def stair_ends(stair: Stair) -> tuple[np.ndarray, np.ndarray]:
+    """(3,) and (3,) the points on the floors before a stair's foot and after its head, metres, world."""
+    path = np.asarray(stair.path, float)
+    before, after = path[0] - path[1], path[-1] - path[-2]
+    ends = (path[0], before), (path[-1], after)
+    foot, head = (p + BEFORE_STAIRS * way * [1, 1, 0] / np.linalg.norm(way[:2]) for p, way in ends)
+    return foot, head
+
+
+def stair_points(stair: Stair) -> np.ndarray:
+    """(k, 3) where one stands on a stair, from its foot up: in its bends, and on flights that are long; world."""
+    path, points = np.asarray(stair.path, float), []
+    rise = (path[-1, 2] - path[0, 2]) / stair.risers
+    for k, (a, b) in enumerate(itertools.pairwise(path)):
+        pieces = int(np.linalg.norm(b - a) // LONG_FLIGHT) + 1
+        for t in np.arange(1, pieces) / pieces if b[2] > a[2] else ():
+            x, y, z = a + t * (b - a)
+            points.append((x, y, a[2] + rise * np.ceil((z - a[2]) / rise)))
+        if k + 2 < len(path) and abs(np.linalg.det([(b - a)[:2], (path[k + 2] - b)[:2]])) > 1e-3:
+            points.append(tuple(b))
+    return np.round(points, 4).reshape(-1, 3)
+
+
+def _climb(stair: Stair, positions: list, rooms: list[str], edges: list[tuple[int, int]]) -> None:
+    """Add a stair's viewpoints and the edges along it."""
+    standing = np.array(positions) - [0, 0, EYE]
+    foot, head = (int(np.argmin(np.linalg.norm(standing - p, axis=1))) for p in stair_ends(stair))
+    points = stair_points(stair)
+    edges += itertools.pairwise([foot, *range(len(positions), len(positions) + len(points)), head])
+    positions += [(x, y, z + EYE) for x, y, z in points.tolist()]
+    rooms += [stair.rooms[bool(2 * z > stair.path[0][2] + stair.path[-1][2] + 1e-3)] for z in points[:, 2]]
 
 
 def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list[str], list[tuple[int, int]]]:
@@ -206,12 +244,30 @@ def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list
             "widen its door or move the furniture that blocks it"
         )
     room_of_cell[~reach] = -1
+    grid.stairs = _stair_cells(house, rooms, grid, reach)
     nodes = _spread(space, grid, room_of_cell, rooms, spacing)
     nodes = _join(house, storey, space, grid, reach, nodes, spacing)
     nodes = _thinned(space, grid, room_of_cell, nodes, spacing)
     xy = grid.xy[nodes]
     pairs = [tuple(p) for p in _visible_pairs(space, xy, LONGEST_EDGE * spacing).tolist()]
     return xy.tolist(), [rooms[room_of_cell[n]].id for n in nodes], pairs
+
+
+def _stair_cells(house: House, rooms: Sequence[Room], grid: FreeCells, reach: np.ndarray) -> list[int]:
+    """The cells where one comes to a storey's stairs and leaves them.
+
+    Raises:
+      HouseError: something stands there.
+    """
+    ids, cells, ends = {r.id for r in rooms}, np.flatnonzero(reach), []
+    for stair in house.stairs:
+        for room, end in zip(stair.rooms, stair_ends(stair)):
+            if room in ids:
+                gap, cell = cKDTree(grid.xy[cells]).query(end[:2])
+                if gap > 0.15:
+                    raise HouseError(f"stair {stair.id!r} cannot be entered from {room!r}; clear the floor before it")
+                ends.append(int(cells[cell]))
+    return ends
 
 
 def unreachable_rooms(house: House) -> tuple[str, ...]:
@@ -231,9 +287,16 @@ def closed_rooms(room_of_cell: np.ndarray, reach: np.ndarray, rooms: int) -> lis
     return [k for k in range(rooms) if reached[k] == 0 or reached[k] < ENTERED * free[k]]
 
 
-def reachable(house: House, storey: int) -> tuple[FreeCells, np.ndarray, np.ndarray]:
-    """The storey's grid, the room index of each cell (-1 for none), and which cells are joined to the most rooms."""
+def reachable(
+    house: House, storey: int, also: Sequence[shapely.Geometry] = ()
+) -> tuple[FreeCells, np.ndarray, np.ndarray]:
+    """The storey's grid, the room index of each cell (-1 for none), and which cells are joined to the most rooms.
+
+    Args:
+      also: where the agent's centre may be besides, metres, world.
+    """
     space = walkable(house, storey)
+    space = shapely.union_all([space, *also]) if also else space
     shapely.prepare(space)
     grid = FreeCells(space)
     room_of_cell = _rooms_of_cells(grid, [r for r in house.rooms if r.storey == storey])
@@ -265,6 +328,8 @@ class FreeCells:
 
     def __init__(self, space: shapely.Geometry) -> None:
         self.space = space
+        self.stairs: list[int] = []
+        """Cells at the foot and at the head of stairs, which are viewpoints."""
         x0, y0, x1, y1 = space.bounds
         self.x0, self.y0 = np.floor(x0 / CELL) * CELL, np.floor(y0 / CELL) * CELL
         nx, ny = int(np.ceil((x1 - self.x0) / CELL)) + 1, int(np.ceil((y1 - self.y0) / CELL)) + 1
@@ -303,16 +368,19 @@ class FreeCells:
 def _spread(
     space: shapely.Geometry, grid: FreeCells, room_of_cell: np.ndarray, rooms: Sequence[Room], spacing: float
 ) -> list[int]:
-    """Cells of the viewpoints: halls and corridors first, in each room a loose packing of calm spots that see more."""
-    chosen: list[int] = []
+    """Cells of the viewpoints: those at stairs, halls and corridors, then in each room a loose packing of calm spots
+    that see more."""
+    chosen = list(grid.stairs)
     apart = NODE_DISTANCE * spacing
     order = sorted(range(len(rooms)), key=lambda k: (rooms[k].kind not in ("hall", "corridor", "stairwell"), k))
     for k in order:
         cells = np.flatnonzero(room_of_cell == k)
         xy, calm = grid.xy[cells], np.minimum(grid.clearance[cells], 0.5)
-        gap = np.full(len(cells), np.inf)
-        elsewhere = cKDTree(grid.xy[chosen]).query(xy)[0] if chosen else np.full(len(cells), np.inf)
-        open_ = np.ones(len(cells), bool)
+        own = [c for c in grid.stairs if room_of_cell[c] == k]
+        gap, elsewhere = (
+            cKDTree(grid.xy[others]).query(xy)[0] if others else np.full(len(cells), np.inf) for others in (own, chosen)
+        )
+        open_ = gap >= apart
         while open_.any():
             # close to the wanted distance from the room's others, well clear of obstacles
             value = 1.2 * calm - 0.5 * np.abs(np.minimum(gap, 1.5 * apart) - apart) - 0.4 * np.maximum(0, 1 - elsewhere)
@@ -342,7 +410,7 @@ def _seen(space: shapely.Geometry, grid: FreeCells, cells: np.ndarray, chosen: l
 def _thinned(
     space: shapely.Geometry, grid: FreeCells, room_of_cell: np.ndarray, nodes: list[int], spacing: float
 ) -> list[int]:
-    """The nodes without those that crowd another one and that neither their room nor the graph needs."""
+    """The nodes without those that crowd another one and that neither their room nor the graph nor stairs need."""
     xy = grid.xy[nodes]
     pairs = _visible_pairs(space, xy, LONGEST_EDGE * spacing)
     lengths = np.hypot(*(xy[pairs[:, 0]] - xy[pairs[:, 1]]).T)
@@ -350,7 +418,7 @@ def _thinned(
     rooms = room_of_cell[nodes]
     for a, b in pairs[np.argsort(lengths, kind="stable")][: int((lengths < CROWDED * spacing).sum())].tolist():
         for k in (a, b) if grid.clearance[nodes[a]] <= grid.clearance[nodes[b]] else (b, a):
-            if not (alive[a] and alive[b]) or (alive & (rooms == rooms[k])).sum() < 2:
+            if nodes[k] in grid.stairs or not (alive[a] and alive[b]) or (alive & (rooms == rooms[k])).sum() < 2:
                 continue
             alive[k] = False
             kept = pairs[alive[pairs].all(1)]

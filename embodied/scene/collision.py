@@ -20,6 +20,7 @@ from embodied.assets.json_file import parse_file
 from embodied.assets.records import Asset, MeshPart
 from embodied.geometry import r2
 from embodied.house.house import House, Room
+from embodied.house.shapes import well_of
 
 UNCOUNTED_MODULES = (
     "embodied.assets",
@@ -27,6 +28,7 @@ UNCOUNTED_MODULES = (
     "embodied",
     "embodied.house",
     "embodied.house.house",
+    "embodied.house.shapes",
     "embodied.scene",
 )
 """Modules that do not count as code of boxes: packages' names, the catalogue's rows, and houses, which boxes know
@@ -262,7 +264,10 @@ def density_of(asset: Asset) -> float:
 def floor_boxes(house: House, room: Room, thickness: float = 0.2) -> tuple[CollisionBox, ...]:
     """Boxes under the floor of `room`; oblique rooms are covered by boxes up to half a metre beyond."""
     polygon, top = shapely.Polygon(room.polygon), house.storey_of(room).elevation
-    xs, ys = (sorted({round(c[i], 6) for c in room.polygon}) for i in (0, 1))
+    wells = [well_of(s) for s in house.stairs if s.rooms[1] == room.id]
+    corners = [*room.polygon, *(c for w in wells for c in w.exterior.coords)]
+    polygon = polygon.difference(shapely.union_all(wells)) if wells else polygon
+    xs, ys = (sorted({round(c[i], 6) for c in corners}) for i in (0, 1))
     boxes = []
     for x0, x1 in itertools.pairwise(xs):
         for y0, y1 in itertools.pairwise(ys):

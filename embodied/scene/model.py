@@ -29,7 +29,7 @@ from embodied.assets.moving_parts import closed
 from embodied.assets.records import Finish, MeshPart
 from embodied.geometry import rotation
 from embodied.house.house import House, Placement
-from embodied.scene import backdrop, collision, cupboards, doors
+from embodied.scene import backdrop, collision, cupboards, doors, stairs
 from embodied.scene.cupboards import Case
 from embodied.scene.doors import Hung
 from embodied.scene.house_meshes import Part, house_parts, owners
@@ -514,6 +514,8 @@ def _add_collisions(
         _add_boxes(spec.worldbody, f"{room.id}/floor", collision.floor_boxes(house, room))
         for i in range(len(room.polygon)):
             _add_boxes(spec.worldbody, f"{room.id}/wall_{i}", collision.wall_boxes(house, room, i))
+    for stair in house.stairs:
+        _add_boxes(spec.worldbody, f"{stair.id}/stairs", stairs.stair_boxes(house, stair))
     known: dict[tuple, tuple[collision.CollisionBox, ...]] = {}
     for p in house.placements:
         if is_underfoot(p) or p.object_class in without:

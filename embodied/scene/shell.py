@@ -12,10 +12,12 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+import shapely
 
 from embodied.assets.built.primitives import Shape, flat, joined, part, quads
 from embodied.assets.records import Finish
 from embodied.house.house import House, Room
+from embodied.house.shapes import well_of
 from embodied.scene import joinery, outdoors, stairs
 from embodied.scene.part import Part
 from embodied.scene.walls import Hole, floor_turn, hole_on, inset, turned_uv, wall_face
@@ -60,9 +62,9 @@ def room_parts(house: House, room: Room, finish: FinishOf) -> list[Part]:
     for stair in house.stairs:
         lower, upper = (house.room_by_id[r] for r in stair.rooms)
         if room.storey == lower.storey:
-            ceiling_area = ceiling_area.difference(stairs.well(stair))
+            ceiling_area = ceiling_area.difference(well_of(stair))
         if room.storey == upper.storey:
-            floor_area = floor_area.difference(stairs.well(stair))
+            floor_area = floor_area.difference(well_of(stair))
     turn = floor_turn(house)
     parts = [
         _part(f"{room.id}/floor", "floor", room, finish(room.floor_finish), turned_uv(flat(floor_area, z0), turn)),
@@ -103,6 +105,7 @@ def holes_of(house: House, room: Room, p: np.ndarray, q: np.ndarray, casings: bo
 def skirting_of(house: House, room: Room) -> Shape | None:
     """Boards at the foot of the walls, mitred in the corners, left out at doors; None if nothing is left."""
     z = house.storey_of(room).elevation
+    wells = shapely.union_all([well_of(s).buffer(0.05) for s in house.stairs if room.id in s.rooms])
     wall, front = (inset(room.polygon, house.inner_wall / 2 + t) for t in (0.0, SKIRTING_THICKNESS))
     runs = []
     for i in range(len(wall)):
@@ -111,6 +114,9 @@ def skirting_of(house: House, room: Room) -> Shape | None:
         d = (q - p) / length
         n = np.array([-d[1], d[0]]) * SKIRTING_THICKNESS
         cuts = [(s0, s1) for s0, low, s1, _ in holes_of(house, room, p, q, casings=True) if low < z + SKIRTING_HEIGHT]
+        for line in shapely.get_parts(shapely.LineString([p, q]).intersection(wells)):
+            s = ((np.asarray(line.coords) - p) @ d).tolist()  # no floor there, or a flight before the wall
+            cuts = sorted([*cuts, (min(s), max(s))]) if s else cuts
         start = 0.0
         for s0, s1 in [*cuts, (length, math.inf)]:
             if s0 - start > 0.01:
