@@ -8,7 +8,6 @@ buffer, and OpenGL notes for every pixel only which texel of the atlas is in fro
 from __future__ import annotations
 
 import ctypes
-import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
 
@@ -42,8 +41,6 @@ SHADER_OUTPUTS = {
 """How what shaders write is kept and read, and what it is where nothing is; `near` is 1 over metres."""
 FRAME_BUFFERS = {"places": ("column", "row"), "numbers": ("number", "near"), "all": tuple(SHADER_OUTPUTS)}
 """Numbers that shaders write, in their order."""
-EDGE = 0.01
-"""Metres before the eye from which on it is known where a point is seen."""
 COARSE = 1.5
 """Widest cell of a copy that is drawn in place of a mesh, pixels: between 0 and 1.5 a picture of 128 x 128 loses 0.12
 of 33.5 dB against one drawn eight times as large; at 2.5 one sees gaps between drawers close."""
@@ -87,7 +84,6 @@ class Raster:
         self._moving = {i: (int(ends[i]), corners[ends[i] : ends[i + 1]].copy()) for i in moving}
         _upload_corners(self._array, self._buffers, corners)
         self._triangles = triangles.astype(np.uint32)
-        self._facing = _facing(corners["xyz"], triangles)
         self._through, self._canvas = (int(t) for t in GL.glGenTextures(2))
         _make_texture(self._through, pictures[1].shape[:2], pictures[1])
         pixels = {"through": shaders.THROUGH, "numbers": shaders.NUMBERS, "places": shaders.PLACES, "all": shaders.ALL}
@@ -130,10 +126,10 @@ class Raster:
         if step is None:
             picture = self.rgb(camera, drawn, chosen)
             return picture, *self.depth_and_ids(camera, size, chosen)
-        solid, clear, panes = self._sorted(camera, drawn, chosen)
+        solid, clear = self._sorted(camera, drawn, chosen)
         program = self._programs["all"][0]
         GL.glProgramUniform3f(program, GL.glGetUniformLocation(program, "drawn"), step, 1 / step, step / (step - 1))
-        picture = self._coloured("all", camera, drawn, solid, clear, panes)
+        picture = self._coloured("all", camera, drawn, solid, clear)
         if len(clear):
             GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._frames["all"])
             self._draw("all", self._matrix(camera, drawn), clear)
@@ -148,9 +144,6 @@ class Raster:
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._buffers[0])
         GL.glBufferSubData(GL.GL_ARRAY_BUFFER, first * CORNER.itemsize, corners.nbytes, corners.view(np.uint8))
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, 0)
-        start, count = int(self._starts[0, mesh]), int(self._counts[0, mesh])
-        own = self._triangles[start : start + count].astype(np.int64) - first
-        self._facing[start : start + count] = _facing(corners["xyz"], own)
         columns = np.ascontiguousarray(vertices.T)
         low, high = columns.min(1), columns.max(1)
         self.middles[mesh], self.reaches[mesh] = (low + high) / 2, (high - low) / 2
@@ -173,15 +166,12 @@ class Raster:
         for program, _ in self._programs.values():
             GL.glDeleteProgram(program)
 
-    def _sorted(
-        self, camera: Camera, size: tuple[int, int], chosen: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """`_ranges` of what is opaque, the nearest first, and of what shines through, the farthest first; and the
-        meshes of the latter."""
+    def _sorted(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`_ranges` of what is opaque, the nearest first, and of what shines through, the farthest first."""
         order = chosen[((self.middles[chosen] - np.array(camera.position)) ** 2).sum(1).argsort()]
         clear = self._is_clear[order]
         ranges = self._ranges(camera, size, order)
-        return ranges[~clear], ranges[clear][::-1], order[clear]
+        return ranges[~clear], ranges[clear][::-1]
 
     def _ranges(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> np.ndarray:
         """(k, 2) first and number of the triangles to draw of the meshes `chosen` (k,)."""
@@ -194,7 +184,7 @@ class Raster:
         return np.stack([self._starts[level, chosen], counts[level, np.arange(len(chosen))]], axis=1)
 
     def _coloured(
-        self, frame: str, camera: Camera, size: tuple[int, int], solid: np.ndarray, clear: np.ndarray, panes: np.ndarray
+        self, frame: str, camera: Camera, size: tuple[int, int], solid: np.ndarray, clear: np.ndarray
     ) -> np.ndarray:
         """(h, w, 4) uint8, bottom row first, of what `_sorted` returned; what else is in `frame` is of what is
         solid."""
@@ -203,22 +193,11 @@ class Raster:
         self._draw(frame, matrix, solid)
         column, row = (_read(frame, name, size) for name in FRAME_BUFFERS["places"])
         picture = cv2.remap(self._atlas, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
-        left, low, width, height = extent(self.middles[panes], self.reaches[panes], matrix, size)
-        if width * height:
-            part = picture[low : low + height, left : left + width]
-            part[:] = self._laid(clear, matrix, part, (left, low))
-        return picture
-
-    def _laid(self, clear: np.ndarray, matrix: np.ndarray, part: np.ndarray, corner: tuple[int, int]) -> np.ndarray:
-        """(h, w, 4) uint8: what shines through over `part` of the picture, which shows what is behind.
-
-        Args:
-          corner: column and row in the picture where the part begins.
-        """
-        (left, low), (height, width) = corner, part.shape[:2]
-        here = (left, low, width, height, GL.GL_RGBA, GL.GL_UNSIGNED_BYTE)
+        if not len(clear):
+            return picture
+        here = (0, 0, size[1], size[0], GL.GL_RGBA, GL.GL_UNSIGNED_BYTE)
         GL.glBindTexture(GL.GL_TEXTURE_2D, self._canvas)
-        GL.glTexSubImage2D(GL.GL_TEXTURE_2D, 0, *here, np.ascontiguousarray(part))
+        GL.glTexSubImage2D(GL.GL_TEXTURE_2D, 0, *here, picture)
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._frames["canvas"])
         GL.glBindTexture(GL.GL_TEXTURE_2D, self._through)
         GL.glEnable(GL.GL_BLEND)
@@ -227,9 +206,8 @@ class Raster:
         self._draw("through", matrix, clear)
         GL.glDepthMask(True)
         GL.glDisable(GL.GL_BLEND)
-        laid = np.empty((height, width, 4), np.uint8)
-        GL.glReadPixels(*here, laid)
-        return laid
+        GL.glReadPixels(*here, picture)
+        return picture
 
     def _matrix(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         """`projection` to the depths that this OpenGL takes at present; MuJoCo leaves it with 0 to 1."""
@@ -253,13 +231,10 @@ class Raster:
             clear(GL.GL_COLOR, k, (SHADER_OUTPUTS[name][4], 0, 0, 0))
 
     def _draw(self, program: str, matrix: np.ndarray, ranges: np.ndarray) -> None:
-        """Triangles of `ranges` (k, 2), those that face the other way left out before OpenGL looks at their corners."""
+        """Triangles of `ranges` (k, 2)."""
         if not len(ranges):
             return
-        eye = np.linalg.solve(matrix[[0, 1, 3], :3].astype(float), -matrix[[0, 1, 3], 3].astype(float))
-        some = [slice(first, first + count) for first, count in ranges.tolist()]
-        seen = np.concatenate([self._facing[k] for k in some]) @ np.array([*eye, 1.0], np.float32) > 0
-        triangles = np.concatenate([self._triangles[k] for k in some])[seen]
+        triangles = np.concatenate([self._triangles[first : first + count] for first, count in ranges.tolist()])
         number, place = self._programs[program]
         GL.glUseProgram(number)
         GL.glUniformMatrix4fv(place, 1, True, matrix)
@@ -313,31 +288,6 @@ def projection(camera: Camera, size: tuple[int, int], lowest: float) -> np.ndarr
     return rows.astype(np.float32)
 
 
-def extent(
-    middles: np.ndarray, reaches: np.ndarray, matrix: np.ndarray, size: tuple[int, int]
-) -> tuple[int, int, int, int]:
-    """Left column, bottom row, width and height of the part of a picture of `size` that boxes may cover.
-
-    Args:
-      middles, reaches: (k, 3) metres, of the boxes and half their sizes.
-      matrix: `projection` of the camera.
-    """
-    if not len(middles):
-        return 0, 0, 0, 0
-    corners = (middles[:, None] + SIGNS * reaches[:, None]).reshape(-1, 3)
-    x, y, w = matrix[[0, 1, 3], :3].astype(float) @ corners.T + matrix[[0, 1, 3], 3:]
-    if w.min() < EDGE:  # beside the eye, where nothing can be said
-        return 0, 0, size[1], size[0]
-    spans = []
-    for at, n in ((x / w, size[1]), (y / w, size[0])):
-        low, high = np.clip([(at.min() + 1) * n / 2 - 1, (at.max() + 1) * n / 2 + 1], 0, n)
-        spans.append((int(low), math.ceil(high) - int(low)))
-    (left, width), (bottom, height) = spans
-    return left, bottom, width, height
-
-
-SIGNS = np.array(list(itertools.product((-1, 1), repeat=3)))
-"""(8, 3) of the corners of a box."""
 MESH_CELLS = np.array([0.0, *coarser.COPY_CELLS])
 
 
@@ -371,17 +321,6 @@ def _arranged(
     counts = np.array([np.bincount(c.mesh[c.faces[:, 0]], minlength=len(meshes)) for c in (whole, *copies)])
     starts = np.cumsum(counts).reshape(counts.shape) - counts
     return np.concatenate([corners, *more]), np.concatenate(faces), starts, counts
-
-
-def _facing(xyz: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(m, 4) float32, of which the product with a point (x, y, z, 1) is positive where a triangle is seen from."""
-    planes = np.empty((len(triangles), 4), np.float32)
-    first, away = triangles[:, 0], np.zeros(len(triangles))
-    for k, n in enumerate(coarser.normals(xyz, triangles)):
-        planes[:, k] = n
-        away -= n * xyz[first, k]
-    planes[:, 3] = away
-    return planes
 
 
 def _upload_corners(array: int, buffers: Sequence[int], corners: np.ndarray) -> None:
