@@ -131,7 +131,7 @@ def test_every_pixel_is_looked_up_where_its_ray_meets_the_cube(seed, way, reques
     kernels = request.getfixturevalue("kernels") if way == "numba" else None
     monkeypatch.setattr(sampling, "numba_kernels", lambda: kernels)
     yaw, pitch, vfov, h, w = some_view(seed)
-    along, x, y = perspective_grid.__wrapped__(S, yaw, pitch, vfov, h, w).maps()
+    along, x, y = perspective_grid.__wrapped__(S, yaw, pitch, vfov, h, w).maps
     rays = pinhole(yaw, pitch, vfov, h, w)
     face = np.floor(y / (S + 2)).astype(int)
     forward, up = (np.array([f[i] for f in FACES])[face] for i in (0, 1))

@@ -117,7 +117,7 @@ class Skyboxes:
         (its src/lib/fragment.sh).
         """
         padded = self.distances(scan, viewpoint)
-        _, x, y = _grid(padded.shape[1] - 2, heading, elevation, vfov, size).maps()
+        _, x, y = _grid(padded.shape[1] - 2, heading, elevation, vfov, size).maps
         along_rays = cv2.remap(padded, x, y, cv2.INTER_LINEAR)
         return cv2.multiply(along_rays, _ray_shortening(vfov, *size), dtype=cv2.CV_16U)[..., None]
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import functools
 import math
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -137,7 +136,7 @@ class Panorama:
         return resampled_depth(self._padded_nearness, grid)
 
     def _ids(self, grid: PixelGrid) -> np.ndarray:
-        _, x, y = grid.maps()
+        _, x, y = grid.maps
         return cv2.remap(self._padded_ids, x, y, cv2.INTER_NEAREST).view(np.int32)
 
 
@@ -179,86 +178,36 @@ def padded_plane(
 
 def resampled_rgb(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     """(h, w, 3) uint8: what a grid shows of `padded_rgba`."""
-    rgba, (_, x, y) = _scratch(grid.shape, threading.get_ident()).rgba, grid.maps()
-    cv2.remap(padded, x, y, cv2.INTER_LINEAR, dst=rgba)
-    return cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
+    return cv2.cvtColor(cv2.remap(padded, *grid.maps[1:], cv2.INTER_LINEAR), cv2.COLOR_RGBA2RGB)
 
 
 def resampled_depth(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     """(h, w) float32: the depth that a grid shows of `padded_nearness`; inf where nothing is."""
-    work, (along, x, y) = _scratch(grid.shape, threading.get_ident()), grid.maps()
-    nearest = cv2.remap(padded, x, y, cv2.INTER_NEAREST)
-    cv2.remap(padded, x, y, cv2.INTER_LINEAR, dst=work.smooth)
-    cv2.divide(work.smooth, nearest, dst=work.ratio)
-    cv2.inRange(work.ratio, 1 - CREASE, 1 + CREASE, dst=work.mask)
-    cv2.copyTo(work.smooth, work.mask, nearest)
+    along, x, y = grid.maps
+    nearest, smooth = (cv2.remap(padded, x, y, way) for way in (cv2.INTER_NEAREST, cv2.INTER_LINEAR))
+    cv2.copyTo(smooth, cv2.inRange(cv2.divide(smooth, nearest), 1 - CREASE, 1 + CREASE), nearest)
     cv2.multiply(nearest, along, dst=nearest)
     with np.errstate(divide="ignore"):
         return np.divide(1.0, nearest, out=nearest)
 
 
-@dataclass(eq=False)
-class _Scratch:
-    """Arrays of one picture's size to work in: fresh memory costs more than what is done with it."""
-
-    rgba: np.ndarray
-    smooth: np.ndarray
-    ratio: np.ndarray
-    mask: np.ndarray
-    maps: np.ndarray
-    """(3, h, w)."""
-    grid: PixelGrid | None = None
-    """Key of the maps."""
-
-
-@functools.lru_cache(maxsize=8)
-def _scratch(shape: tuple[int, int], thread: int) -> _Scratch:
-    """The arrays of one thread."""
-    return _Scratch(
-        np.empty((*shape, 4), np.uint8),
-        np.empty(shape, np.float32),
-        np.empty(shape, np.float32),
-        np.empty(shape, np.uint8),
-        np.empty((3, *shape), np.float32),
-    )
-
-
+@dataclass(frozen=True, eq=False)
 class PixelGrid:
     """Places of a picture's pixels on the padded faces."""
 
-    def __init__(
-        self, s: int, shape: tuple[int, int], draw: Callable[[np.ndarray], None], *, keep: bool = False
-    ) -> None:
-        """Args:
-        s: side of a face, pixels.
-        shape: height and width of the picture.
-        draw: writes the maps.
-        keep: keep them from the first time on.
-        """
-        self.s, self.shape, self.draw = s, shape, draw
-        self._keep = keep
-        self._kept: np.ndarray | None = None
+    s: int
+    """Side of a face, pixels."""
+    shape: tuple[int, int]
+    """Height and width of the picture."""
+    draw: Callable[[np.ndarray], None]
+    """Writes the maps."""
 
+    @functools.cached_property
     def maps(self) -> np.ndarray:
-        """(3, h, w) float32: depth in the face per depth in the picture, then the two maps of cv2.remap.
-
-        They are kept from the second time on, since fresh memory costs more than to draw them. Before, they stand
-        until this thread asks another grid of this shape.
-        """
-        if self._kept is not None:
-            return self._kept
-        work = _scratch(self.shape, threading.get_ident())
-        if work.grid is self:
-            return work.maps
-        if self._keep:
-            kept = np.empty_like(work.maps)
-            self.draw(kept)
-            self._kept = kept
-            return kept
-        work.grid, self._keep = None, True
-        self.draw(work.maps)
-        work.grid = self
-        return work.maps
+        """(3, h, w) float32: depth in the face per depth in the picture, then the two maps of cv2.remap."""
+        out = np.empty((3, *self.shape), np.float32)
+        self.draw(out)
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,7 +252,7 @@ def grid36(s: int, size: int) -> PixelGrid:
             view = perspective_grid.__wrapped__(s, yaw, pitch, VFOV36, size, size)
             view.draw(maps[:, k * size : (k + 1) * size])
 
-    return PixelGrid(s, (VIEWS * size, size), draw, keep=True)
+    return PixelGrid(s, (VIEWS * size, size), draw)
 
 
 @functools.lru_cache(maxsize=4)
@@ -314,7 +263,7 @@ def equirect_grid(s: int, height: int) -> PixelGrid:
     rows = np.stack([np.cos(pitch), np.sin(pitch)]).astype(np.float32)
     columns = np.stack([np.cos(yaw), np.sin(yaw), np.zeros(2 * height)]).astype(np.float32)
     rays = Rays(rows, columns, np.array([0, 0, 1], np.float32))
-    return PixelGrid(s, (height, 2 * height), functools.partial(locate, s, rays), keep=True)
+    return PixelGrid(s, (height, 2 * height), functools.partial(locate, s, rays))
 
 
 @functools.lru_cache(maxsize=8)

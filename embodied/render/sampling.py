@@ -9,7 +9,6 @@ from __future__ import annotations
 import functools
 import importlib
 import math
-import threading
 import warnings
 from types import ModuleType
 from typing import NamedTuple
@@ -61,7 +60,7 @@ def locate(s: int, rays: Rays, maps: np.ndarray) -> None:
         return
     half, middle, side = np.float32(s / 2), np.float32((s + 1) / 2), np.float32(s + 2)
     maps[0], straight = 0, np.all(rays.rows[0] == 1)
-    spare = _spare(maps[0].size, threading.get_ident())
+    spare = np.empty(4 * maps[0].size, np.float32)
     for face, i, j in _seen(rays):
         here = maps[:, i, j]
         places, scale = spare[: here.size].reshape(here.shape), spare[-here[0].size :].reshape(here.shape[1:])
@@ -108,12 +107,6 @@ def _reach(rays: Rays) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     least, most, lowest, highest = rays.rows[0].min(), rays.rows[0].max(), rays.rows[1].min(), rays.rows[1].max()
     reach = most * across if least == most else np.maximum(least * across, most * across)
     return across, rising, reach + np.maximum(lowest * rising, highest * rising)
-
-
-@functools.lru_cache(maxsize=4)
-def _spare(size: int, thread: int) -> np.ndarray:
-    """(4 size,) float32 of one thread to work in: fresh memory costs more than what is done with it."""
-    return np.empty(4 * size, np.float32)
 
 
 def _span(where: np.ndarray) -> slice:
