@@ -22,9 +22,7 @@ OURS = "embodied"
 ROOT = Path(str(sys.modules[OURS].__file__)).resolve().parent.parent
 BESIDE = ("agents", "assets", "viz")
 """Parts of it that lie beside its folder in a clone, and inside it where a wheel installed them."""
-BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
-"""Fields of statements that hold statements."""
-INDIFFERENT = frozenset({"tqdm", "joblib", "ray", "numba", "OpenGL", "gymnasium", "rerun", "psutil"})
+INDIFFERENT = frozenset({"tqdm", "joblib", "numba", "OpenGL", "gymnasium", "rerun", "psutil"})
 """Libraries that decide no byte of any product: they show, spread, hasten or hand on what others make."""
 
 
@@ -70,19 +68,15 @@ def closure(*makers: str, root: Path = ROOT, without: Collection[str] = ()) -> C
     return Closure(dict(sorted(paths.items())), tuple(sorted(libraries)))
 
 
-def imported(tree: ast.Module, module: str, *, package: bool, called: bool) -> Iterator[str]:
-    """Dotted names that a module imports when it runs: modules, and what may be modules in packages.
-
-    Args:
-      called: calls of `import_module` are looked for, too, in all expressions; without, statements are enough.
-    """
+def imported(tree: ast.Module, module: str, *, package: bool) -> Iterator[str]:
+    """Dotted names that a module imports when it runs: modules, and what may be modules in packages."""
     waiting: list[ast.AST] = list(tree.body)
     while waiting:
         node = waiting.pop()
         if isinstance(node, ast.If) and _last_name(node.test) == "TYPE_CHECKING":
             waiting += node.orelse
             continue
-        waiting += ast.iter_child_nodes(node) if called else (n for b in BLOCKS for n in getattr(node, b, ()))
+        waiting += ast.iter_child_nodes(node)
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -133,8 +127,7 @@ def _read(source: bytes, module: str, package: bool) -> _Read:
     nodes = ast.walk(tree) if b".toml" in source else ()
     texts = [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
     tables = frozenset(text for text in texts if re.fullmatch(r"\w+\.toml", text))
-    names = imported(tree, module, package=package, called=b"import_module" in source)
-    return _Read(tuple(names), tables, digest(_described(tree)))
+    return _Read(tuple(imported(tree, module, package=package)), tables, digest(_described(tree)))
 
 
 def _last_name(node: ast.expr) -> str:

@@ -111,9 +111,9 @@ def _seconds(lightings: Sequence[House], catalogue: Catalogue, cache: Path, qual
     start = time.process_time()
     made = bake_all(lightings, catalogue, cache, quality)
     whole = time.process_time() - start
-    parts = [sum(b.manifest["seconds"].values()) for b in made]
+    parts = [b.manifest["processor_seconds"] for b in made]
     parts[0] += whole - sum(parts)  # what comes before the first
-    parts[0] -= made[0].manifest["seconds"]["unwrap"]
+    parts[0] -= made[0].manifest["unwrap_seconds"]
     return parts
 
 

@@ -153,7 +153,7 @@ def surface_of(
     )
     if not things:
         return None
-    atlas, maps = atlas_of(things), ColourMaps(cache)
+    atlas, maps = atlas_of(things), ColourMaps()
     lux = luxels_of(atlas, maps)
     meshes, gloss = meshes_of(atlas, 0)
     ends = np.cumsum([0, *(len(t.index) for t in lux.texels)])

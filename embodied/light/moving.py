@@ -134,8 +134,12 @@ class MovingHouse:
             self.__dict__.pop("lit", None)
             self._shown_things, self._drawn_at = {}, {}
             self.pages.stand([m for m, _ in self._still])
-            self._take_out(new)
-        shining = self.pages.shine(self._unlit(wanted), self._rests, slack)
+            for name in new:
+                self._take_out(name)
+        surfaces = {name: s for name in wanted if (s := self._things[name].surface) is not None}
+        dark = {name: Placed(s, wanted[name], wanted[name], np.zeros((0, 3))) for name, s in surfaces.items()}
+        rests = {name: thing.rest for name, thing in self._things.items() if thing.rest is not None}
+        shining = self.pages.shine(dark, rests, slack)
         unlit = {}
         for name, thing in self._things.items():
             pose = wanted.get(name, thing.rest)
@@ -199,7 +203,8 @@ class MovingHouse:
     @property
     def _still(self) -> list[tuple[LitMesh, np.ndarray]]:
         """The house's own meshes without what is drawn apart, and, of each face, the number that it had."""
-        away, open_ = self._away, {name.partition("/")[0] for name in self._things if "/" in name}
+        away = frozenset().union(*(t.owners for t in self._things.values()))
+        open_ = {name.partition("/")[0] for name in self._things if "/" in name}
         return [
             (_nothing(m), np.zeros(0, int))
             if m.owner in away
@@ -258,25 +263,12 @@ class MovingHouse:
             coefficients = np.concatenate([self.pages.radiance(c[None], room) for c, room in zip(corners, rooms)])
         return shading(s, turned(coefficients, pose.rotation.T).astype(np.float32))
 
-    def _take_out(self, names: Sequence[str]) -> None:
-        """Give pages the light back that things hid where they were baked."""
-        for name in names:
-            thing = self._things[name]
-            if thing.surface is not None and thing.rest is not None and not name.endswith(INSIDE_NAME):
-                others = [placed for other, placed in self._placed.items() if other != name]
-                self.pages.take_out(self._lit_at({name: (thing.surface, thing.rest)})[name], others)
-
-    def _unlit(self, wanted: Mapping[str, RigidPose]) -> dict[str, Placed]:
-        """Things where they are to be, without their light."""
-        return {
-            name: Placed(s, pose, pose, np.zeros((0, 3)))
-            for name, pose in wanted.items()
-            if (s := self._things[name].surface) is not None
-        }
-
-    @property
-    def _rests(self) -> dict[str, RigidPose]:
-        return {name: thing.rest for name, thing in self._things.items() if thing.rest is not None}
+    def _take_out(self, name: str) -> None:
+        """Give pages the light back that a thing hid where it was baked."""
+        thing = self._things[name]
+        if thing.surface is not None and thing.rest is not None and not name.endswith(INSIDE_NAME):
+            others = [placed for other, placed in self._placed.items() if other != name]
+            self.pages.take_out(self._lit_at({name: (thing.surface, thing.rest)})[name], others)
 
     def _groups(self) -> dict[str, list[Placed]]:
         """Things that move together; the insides of furniture hide no more than the whole does."""
@@ -350,10 +342,6 @@ class MovingHouse:
             glow=[*still.glow, *(None for s in surfaces for _ in s.pages)],
             detail=[*cut(still.detail), *(np.zeros(len(g), np.uint8) for _, _, g in own)],
         )
-
-    @property
-    def _away(self) -> frozenset[str]:
-        return frozenset().union(*(t.owners for t in self._things.values()))
 
     def _corners(self) -> dict[int, np.ndarray]:
         """By number of mesh in `lit`, where vertices are of what is not where it was drawn last."""

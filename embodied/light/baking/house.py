@@ -227,10 +227,9 @@ class BakeContext:
         progress: Progress = lambda stage, done: None,
     ) -> None:
         """`cache` holds what belongs to assets alone; `several` keeps what another lighting can use."""
-        self.took: dict[str, float] = {}
-        clock = _Clock(self.took)
+        start = time.process_time()
         every = [p for p in parts if len(p.mesh.faces)]
-        self.maps, self._house, self._cache, self._sharpness = ColourMaps(cache), house, cache, settings.sharpness
+        self.maps, self._house, self._cache, self._sharpness = ColourMaps(), house, cache, settings.sharpness
         self._outer = [p for p in every if p.kind == "outdoor"]
         things = things_of(
             [p for p in every if p.kind != "outdoor"],
@@ -240,12 +239,13 @@ class BakeContext:
             cache=cache,
             progress=lambda i, n: progress("unwrapping", i / n),
         )
-        clock("unwrap")
+        self.unwrap_seconds = round(time.process_time() - start, 2)
+        free_memory()
         self.atlas = atlas_of(coarsened(things, settings.texels))
         self.lux = luxels_of(self.atlas, self.maps)
         self.space = space_of(self.atlas, self.lux.texels)
         self.memory: LightingCache | None = {} if several else None
-        clock("luxels")
+        free_memory()
 
     @functools.cached_property
     def outside(self) -> Outside | None:
@@ -277,22 +277,16 @@ def solve_house(
     folder: Path | None = None,
     *,
     progress: Progress = lambda s, d: None,
-    took: dict[str, float] | None = None,
 ) -> LightSolution:
     """Everything up to the light of every luxel, which is kept in `folder` where one is given."""
-    clock = _Clock({} if took is None else took)
-    atlas = context.atlas
-    outdoors = outdoors_of(house, settings.rows)
-    clock("outdoors")
+    atlas, outdoors = context.atlas, outdoors_of(house, settings.rows)
     space = with_env(context.space, outdoors.picture)
     lamps = tuple(in_the_open(x, space.scene) for x in lamps_of(house, atlas))
     lux = with_glow(context.lux, house, atlas, lamps)
-    clock("luxels")
     bare = tuple(sorted({x.owner for x in lamps if x.owner in atlas.owners}))
     without = get_or_compute(context.memory, ("without", bare), lambda: scenes_without(space, atlas, bare))
     inputs = BakeInput(house, atlas, lux, space, outdoors, lamps, settings, context.memory, without)
-    light = kept_light(folder, len(lux.position), lambda: solve(inputs, progress, clock))
-    clock("direct")
+    light = kept_light(folder, len(lux.position), lambda: solve(inputs, progress))
     rows = len(outdoors.picture)
     outside = np.median(outdoors.picture[rows * 300 // 1024 : rows * 540 // 1024].reshape(-1, 3), axis=0)
     light_of_rooms = _light_of_rooms(house, atlas, lux, light)
@@ -306,36 +300,32 @@ def solve_house(
 def _make(house: House, context: BakeContext, folder: Path, settings: LightSettings, progress: Progress) -> Bake:
     from embodied.light.baking.check import check
 
-    took, context.took = context.took, {}
     start, used = time.perf_counter(), time.process_time()
-    s = solve_house(house, context, settings, folder, progress=progress, took=took)
-    clock = _Clock(took)
+    s = solve_house(house, context, settings, folder, progress=progress)
     error = check(s, settings.tolerance)
-    clock("check")
+    free_memory()
     if not (folder / PROBES).exists():
         save_record(probes_of(s, settings, context.memory), folder / PROBES)
-    clock("probes")
+    free_memory()
     composer = Composer(s, settings, context.maps, context.memory)
     every = range(len(s.atlas.pages))
     for i in every[::TOGETHER]:
         progress("pages", i / len(every))
         missing = [k for k in every[i : i + TOGETHER] if not all((folder / n).exists() for n in page_files(k))]
         write_pages(folder, {k: page_of(k, composer) for k in missing}, settings.jpeg, context.memory)
-    clock("pages")
+    free_memory()
     first = len(s.atlas.pages)
     pictures = daylit(context.outside, s.outdoors, s.exposure, settings.other_rays)
     for i, picture in enumerate(pictures, first):
         write_bytes(folder / f"page_{i:03d}.jpg", jpeg(picture, settings.jpeg))
-    clock("surroundings")
     write_bytes(folder / "meshes.npz", context.meshes_file)
     write_lamps(folder / "lamps.npz", s.lamps)
-    clock("meshes")
     (folder / "stage_light.npz").unlink(missing_ok=True)
     manifest = {
         **facts_of(s, context.meshes[0], folder),
         "settings": dataclasses.asdict(settings),
         "pages": first + len(pictures),
-        "seconds": {k: round(v, 2) for k, v in took.items()},
+        "unwrap_seconds": context.unwrap_seconds,
         "total_seconds": round(time.perf_counter() - start, 1),
         "processor_seconds": round(time.process_time() - used, 1),
         "check": error,
@@ -343,19 +333,6 @@ def _make(house: House, context: BakeContext, folder: Path, settings: LightSetti
     write_json(folder / "manifest.json", manifest)
     progress("done", 1.0)
     return Bake(folder, manifest)
-
-
-class _Clock:
-    """Notes the processor seconds between calls under a name."""
-
-    def __init__(self, took: dict[str, float]) -> None:
-        self._took, self._last = took, time.process_time()
-
-    def __call__(self, name: str) -> None:
-        free_memory()
-        now = time.process_time()
-        self._took[name] = self._took.get(name, 0.0) + now - self._last
-        self._last = now
 
 
 def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Radiosity) -> dict[str, np.ndarray]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.house.shapes import inward
-from embodied.light.backend import LightingCache, RayScene, array, brightness, floats, get_or_compute, mi
+from embodied.light.backend import LightingCache, RayScene, array, brightness, floats, free_memory, get_or_compute, mi
 from embodied.light.baking import denoise
 from embodied.light.pages.atlas import Atlas
 from embodied.light.settings import LightSettings
@@ -318,11 +318,7 @@ def _infinite_bounces(lux: Luxels, direct: np.ndarray, good: np.ndarray) -> np.n
     return out
 
 
-def solve(
-    inputs: BakeInput,
-    tell: Callable[[str, float], None] = lambda stage, done: None,
-    clock: Callable[[str], None] = lambda name: None,
-) -> Radiosity:
+def solve(inputs: BakeInput, tell: Callable[[str, float], None] = lambda stage, done: None) -> Radiosity:
     """The light of a house."""
     atlas, lux = inputs.atlas, inputs.lux
     sources: tuple[Portal | Lamp, ...] = (*portals_of(inputs.house), *inputs.lamps)
@@ -331,16 +327,16 @@ def solve(
         tell("direct light", k / len(sources))
         which, e = shone_on(inputs, source)
         direct[which] += e
-    clock("direct")
+    free_memory()
     share, patches = sun_light(inputs)
-    clock("sun")
+    free_memory()
     bounced = bounce(inputs, direct + patches, lambda x: tell("bounces", x))
-    clock("bounces")
+    free_memory()
     tell("smoothing", 0.0)
     good, grid = bounced.good, get_or_compute(inputs.memory, "grid", lambda: denoise.Grid(atlas, lux.texels))
     smooth = functools.partial(denoise.smooth_pages, grid=grid, good=good)
     indirect = smooth(bounced.e, steps=(1, 2, 4), likeness=(0.08, 0.08, 0.08), variance=bounced.variance)
     grain = denoise.spatial_variance(direct, grid) * 0.8
     direct = smooth(direct, steps=(1, 2), likeness=(0.3, 0.2), variance=grain)
-    clock("smooth")
+    free_memory()
     return Radiosity(direct, share, patches, indirect + outer_light(inputs), good | ~lux.shell)

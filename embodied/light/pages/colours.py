@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import math
 from dataclasses import dataclass
@@ -11,8 +10,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from embodied.assets.cache import atomic_path, digest
-from embodied.assets.closure import code_digest
 from embodied.assets.decoding import read_picture
 from embodied.light.backend import Array, array, bilinear, dr, floats, mi, unsigned
 from embodied.light.pages.atlas import Page, flat_areas
@@ -20,14 +17,6 @@ from embodied.light.pages.cover import Cover
 
 DARKEST, LIGHTEST = 0.02, 0.88
 """Reflectances are kept between these."""
-UNCOUNTED_BY_MAPS = (
-    "embodied.assets",
-    "embodied.assets.data",
-    "embodied",
-    "embodied.light",
-    *(f"embodied.light.pages.{name}" for name in ("atlas", "cover", "unwrap")),
-)
-"""Modules that the code of halved maps does not count: packages' names, and the geometry that this module colours."""
 HALVINGS = 8
 """Of a colour map, at most."""
 CODE = 1023
@@ -37,11 +26,9 @@ CODE = 1023
 class ColourMaps:
     """Reads colour maps and remembers the last ones; all of a house would fill hundreds of megabytes."""
 
-    def __init__(self, cache: Path | None = None, kept: int = 256, whole: int = 48) -> None:
-        """`kept` maps are remembered halved, which are also kept under `cache`, to be decoded once and not per house;
-        and `whole` as they are."""
-        self._cache = Path(cache) / "maps" if cache else None
-        self._levels = functools.lru_cache(maxsize=kept)(self._read)
+    def __init__(self, kept: int = 256, whole: int = 48) -> None:
+        """`kept` maps are remembered halved, and `whole` as they are."""
+        self._levels = functools.lru_cache(maxsize=kept)(lambda path: _halvings(read_colours(path)))
         self._whole = functools.lru_cache(maxsize=whole)(lambda path: _coded(_ROOTS[read_colours(path)]))
         self.shape = functools.cache(self._shape)
         """Height and width of the map at a path."""
@@ -57,21 +44,6 @@ class ColourMaps:
         sizes = [_halved_size(self.shape(path), k) for k in range(1, level + 1)]
         start = 2 + sum(h * w for h, w in sizes[:-1])
         return self._levels(path)[start : start + math.prod(sizes[-1])].reshape(sizes[-1])
-
-    def _read(self, path: str) -> np.ndarray:
-        """Result of `_halvings` for the map at a path, from disk where it is there and younger than the map."""
-        source, make = Path(path), lambda: _halvings(read_colours(path))
-        if self._cache is None or not source.is_file():
-            return make()
-        stat = source.stat()
-        key = digest(code_digest(__name__, without=UNCOUNTED_BY_MAPS), str(source), stat.st_size, stat.st_mtime_ns)
-        file = self._cache / f"{key[:32]}.npy"
-        with contextlib.suppress(OSError, ValueError, EOFError):
-            return np.load(file, mmap_mode="r", allow_pickle=False)
-        made = make()
-        with atomic_path(file) as temporary, open(temporary, "wb") as f:
-            np.save(f, made)
-        return made
 
 
 def read_colours(path: str) -> np.ndarray:

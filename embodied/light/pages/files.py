@@ -6,7 +6,6 @@ its checksum.
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import zlib
 from collections.abc import Mapping, Sequence
@@ -137,15 +136,14 @@ def open_bake(folder: Path, house: House) -> Bake:
 
 
 def reopened(folder: Path, house: House) -> Bake | None:
-    """The finished bake in `folder`; None where there is none, with what is damaged there deleted and a warning."""
-    if not folder.exists():
-        return None
+    """The finished bake in `folder`; None where there is none. A damaged one is deleted, with a warning."""
     try:
         return open_bake(folder, house)
     except StaleBake as e:
         if (folder / "manifest.json").exists():
             warn(f"{e}; doing so now")
-        _drop_damaged(folder)
+            for old in sorted(p for p in folder.iterdir() if not p.name.startswith(".")):  # which holds a lock, too
+                old.unlink()
         return None
 
 
@@ -188,16 +186,6 @@ def packed_meshes(meshes: Sequence[LitMesh], gloss: Sequence[np.ndarray]) -> byt
 def checksum(path: Path) -> list[int] | None:
     """Size and CRC-32 of a file; None where there is none."""
     return [path.stat().st_size, zlib.crc32(path.read_bytes())] if path.is_file() else None
-
-
-def _drop_damaged(folder: Path) -> None:
-    """Delete the manifest and every file that is not as it says, so that they are made anew."""
-    path = folder / "manifest.json"
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
-        for name, mark in read_json(path)["files"].items():
-            if Path(name).name == name and checksum(folder / name) != mark:  # nothing outside
-                (folder / name).unlink(missing_ok=True)
-    path.unlink(missing_ok=True)
 
 
 def _read_picture(path: Path, mode: int = cv2.IMREAD_COLOR) -> np.ndarray:
