@@ -676,8 +676,8 @@ def gloss_of(bake: Bake, *, detail: bool = True, moving: MovingHouse | None = No
     Args:
       moving: the house as it is with what moves in it.
     """
-    from embodied.light.backend import rays_among
     from embodied.light.pages.gloss_data import gloss_data_of  # late: loads the path tracer
+    from embodied.light.tracing.rays import rays_among
     from embodied.render.gloss import Gloss
 
     if moving is not None:
@@ -692,7 +692,7 @@ def makers(pictures: PictureSettings) -> tuple[str, ...]:
     if pictures.quality is not None:
         modules.append("embodied.light.baking.house")
     if _reflects(pictures):
-        modules += ["embodied.render.gloss", "embodied.light.backend"]
+        modules += ["embodied.render.gloss", "embodied.light.tracing.rays"]
     if isinstance(pictures, Traced):
         modules.append("embodied.light.tracing.reference")
     return tuple(modules)

@@ -20,7 +20,7 @@ from embodied.assets.importing.sh3f import CATALOGUE, MAX_ENTRY, PackError, find
 from embodied.assets.json_file import RecordError
 from embodied.assets.records import ROOM_KINDS, SUPPORTS, ImportRecipe, bounds
 from embodied.assets.rows import DATA
-from embodied.light.backend import rays_among
+from embodied.light.tracing.rays import rays_among
 
 SOME = (
     "scopia/bed1",

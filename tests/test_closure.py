@@ -14,7 +14,7 @@ from embodied.assets.importing import importer
 from embodied.cli import doctor
 from embodied.datasets.build import program
 from embodied.light import settings
-from embodied.light.pages import colours, unwrap
+from embodied.light.pages import unwrap
 from embodied.render.pictures import Baked, Traced, Unlit
 from embodied.scene import collision
 from embodied.world import makers
@@ -75,7 +75,6 @@ def test_what_code_does_counts_and_not_how_it_is_written(tmp_path, one, other, s
 PRODUCTS = {
     "bakes": ("embodied.light.baking.house", settings.UNCOUNTED_BY_LIGHT),
     "unwrappings": ("embodied.light.pages.unwrap", unwrap.UNCOUNTED_BY_UNWRAPPING),
-    "halved maps": ("embodied.light.pages.colours", colours.UNCOUNTED_BY_MAPS),
     "boxes": ("embodied.scene.collision", collision.UNCOUNTED_MODULES),
     "models": (importer.READER, importer.APART),
 }
@@ -83,7 +82,7 @@ DECIDED_BY = {
     "embodied/light/tracing/sky.py": {"bakes"},
     "embodied/house/shapes.py": {"bakes"},
     "embodied/light/pages/unwrap.py": {"bakes", "unwrappings"},
-    "embodied/light/pages/colours.py": {"bakes", "halved maps"},
+    "embodied/light/pages/colours.py": {"bakes"},
     "embodied/geometry.py": {"bakes", "unwrappings", "boxes"},
     "embodied/scene/collision.py": {"boxes"},
     "assets/records.py": {"bakes", "unwrappings", "boxes", "models"},

@@ -11,7 +11,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
 from embodied.assets.records import Finish
-from embodied.light.backend import embree, mitsuba_among, rays_among
+from embodied.light.tracing.rays import embree, mitsuba_among, rays_among
 from embodied.render import gloss
 from embodied.render.camera import Camera
 from embodied.render.film import film, light_of, shown_of

@@ -256,22 +256,16 @@ def _colours(lines: list[Line], where: str) -> np.ndarray | None:
 
 def _numbers(lines: list[Line], width: int, where: str, head: str) -> np.ndarray:
     """(n, width) float64 of lines that begin with `head`."""
-    if not lines:
-        return np.empty((0, width))
-    try:
-        out = np.array([line.split()[:width] for _, line in lines], dtype=np.float64)
-        if out.shape[1:] == (width,):
-            return out
-    except ValueError:
-        pass
-    for number, line in lines:
+    rows = np.empty((len(lines), width))
+    for row, (number, line) in zip(rows, lines):
         try:
-            good = len([float(word) for word in line.split()[:width]]) == width
-        except ValueError:
-            good = False
-        if not good:
-            raise MeshError(f"{where}, line {number}: {head!r} should have {width} numbers, got {line!r}; {CORRECT}")
-    raise AssertionError("every line has its numbers, but they make no array")
+            words = line.split()
+            row[:] = [float(words[k]) for k in range(width)]
+        except (ValueError, IndexError) as e:
+            raise MeshError(
+                f"{where}, line {number}: {head!r} should have {width} numbers, got {line!r}; {CORRECT}"
+            ) from e
+    return rows
 
 
 def _pair(line: Line) -> Line:

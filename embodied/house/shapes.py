@@ -11,6 +11,9 @@ import shapely
 from embodied.geometry import rectangle
 from embodied.house.house import House, Opening, Placement, Room, Stair
 
+_floor = functools.lru_cache(maxsize=256)(shapely.Polygon)
+"""A room's: every picture asks where its camera is."""
+
 
 def footprint(placement: Placement) -> shapely.Polygon:
     """The rotated rectangle that an object covers, metres, world; for a table it includes the air between the legs."""
@@ -36,14 +39,6 @@ def room_at(house: House, position: Sequence[float] | np.ndarray) -> str | None:
         if level and shapely.intersects_xy(_floor(room.polygon), position[0], position[1]):
             return room.id
     return None
-
-
-@functools.lru_cache(maxsize=256)
-def _floor(polygon: tuple[tuple[float, float], ...]) -> shapely.Polygon:
-    """A room's, made ready for many questions: every picture asks where its camera is."""
-    floor = shapely.Polygon(polygon)
-    shapely.prepare(floor)
-    return floor
 
 
 def well_of(stair: Stair) -> shapely.Polygon:

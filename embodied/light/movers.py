@@ -24,7 +24,6 @@ import numpy as np
 from embodied.geometry import r2
 from embodied.house.house import House
 from embodied.house.moment import RigidPose
-from embodied.light.backend import rays_among
 from embodied.light.pages.atlas import atlas_of, things_of
 from embodied.light.pages.colours import ColourMaps, albedo
 from embodied.light.pages.cover import cover, sources
@@ -33,6 +32,7 @@ from embodied.light.probes import CORNERS, LOBE, ORDERS, harmonics
 from embodied.light.settings import LightSettings
 from embodied.light.tracing.emitters import Lamp
 from embodied.light.tracing.luxels import luxels_of, with_glow
+from embodied.light.tracing.rays import rays_among
 from embodied.render.gloss import Rays
 from embodied.render.sampling import numba_kernels
 from embodied.scene.lit_pages import LitMesh
@@ -124,7 +124,7 @@ class Surface:
 
     @functools.cached_property
     def first_hit(self) -> Rays:
-        """Rays among its opaque triangles (embodied.light.backend)."""
+        """Rays among its opaque triangles (embodied.light.tracing.rays)."""
         return rays_among(self.corners)
 
 

@@ -16,7 +16,6 @@ import numpy as np
 from embodied.house.house import House
 from embodied.house.moment import RigidPose
 from embodied.house.shapes import room_at
-from embodied.light.backend import rays_among
 from embodied.light.gather import (
     Blocked,
     LitRays,
@@ -37,6 +36,7 @@ from embodied.light.pages.unwrap import areas_of
 from embodied.light.probes import CORNERS, harmonics, radiance
 from embodied.light.tiles import HALF_TILE, SAMPLES, TILE, Receiver, Tile, blocks_of, luxels_in, read_receiver, sampled
 from embodied.light.tracing.emitters import GLAZING, Lamp, portals_of, read_lamps
+from embodied.light.tracing.rays import rays_among
 from embodied.light.tracing.sky import outdoors, sun_direction, sun_height, sun_strength
 from embodied.render.gloss import Rays
 from embodied.scene.lit_pages import LitMesh

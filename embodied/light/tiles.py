@@ -9,9 +9,9 @@ from typing import TypeAlias
 import cv2
 import numpy as np
 
-from embodied.light.backend import rays_among
 from embodied.light.pages.cover import sources
 from embodied.light.pages.files import Bake, Ingredients
+from embodied.light.tracing.rays import rays_among
 from embodied.scene.lit_pages import LitMesh
 
 TILE = 16

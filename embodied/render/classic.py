@@ -207,12 +207,14 @@ class Renderer:
     @gl.drawing()
     def rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         """(h, w, 3) uint8: colours alone."""
-        return self._rgb(camera, size, self._chosen(camera, size))
+        picture = self._open().rgb(camera, self._drawn_size(size), self._chosen(camera, size))
+        return self._overlaid(averaged(picture, size), camera)
 
     @gl.drawing()
     def depth_and_ids(self, camera: Camera, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
         """(h, w) float32 metres along the optical axis and (h, w) int32, without the colours."""
-        return self._seen(camera, size, self._chosen(camera, size))
+        depth, ids = self._open().depth_and_ids(camera, size, self._chosen(camera, size))
+        return cv2.flip(depth, 0), cv2.flip(ids, 0)
 
     @gl.drawing()
     def panorama(self, position: Sequence[float] | np.ndarray, size: int | None = None) -> Panorama:
@@ -221,9 +223,8 @@ class Renderer:
         rgb = np.empty((6, s, s, 3), np.uint8)
         depth, ids = np.empty((6, s, s), np.float32), np.empty((6, s, s), np.int32)
         for k, camera in enumerate(face_cameras(position)):
-            chosen = self._chosen(camera, (s, s))
-            rgb[k] = self._rgb(camera, (s, s), chosen)
-            depth[k], ids[k] = self._seen(camera, (s, s), chosen)
+            rgb[k] = self.rgb(camera, (s, s))
+            depth[k], ids[k] = self.depth_and_ids(camera, (s, s))
         return Panorama(rgb, depth, ids)
 
     @gl.drawing()
@@ -287,16 +288,8 @@ class Renderer:
         """(height, width) at which colours of a picture of `size` are drawn."""
         return drawn_size(size) if self._software else size
 
-    def _rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> np.ndarray:
-        picture = self._open().rgb(camera, self._drawn_size(size), chosen)
-        return self._overlaid(averaged(picture, size), camera)
-
     def _overlaid(self, rgb: np.ndarray, camera: Camera) -> np.ndarray:
         return rgb if self._overlay is None else self._overlay.over(rgb, camera)
-
-    def _seen(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        depth, ids = self._open().depth_and_ids(camera, size, chosen)
-        return cv2.flip(depth, 0), cv2.flip(ids, 0)
 
 
 def _bare_meshes(parts: Sequence[Part]) -> list[LitMesh]:

@@ -122,7 +122,9 @@ class Panorama:
 
     @functools.cached_property
     def _padded_nearness(self) -> np.ndarray:
-        return padded_nearness(self.size, lambda k, to: np.divide(1.0, self.depth[k], out=to))
+        """1 / depth, which is linear over a plane; 0 where nothing is."""
+        ratio = pad_grid(self.size).ratio
+        return padded_plane(self.size, lambda k, to: np.divide(1.0, self.depth[k], out=to), ratio)
 
     @functools.cached_property
     def _padded_ids(self) -> np.ndarray:
@@ -157,11 +159,6 @@ def padded_rgba(s: int, write: Callable[[int, np.ndarray], object]) -> np.ndarra
     return flat
 
 
-def padded_nearness(s: int, write: Callable[[int, np.ndarray], object]) -> np.ndarray:
-    """(6 (s + 2), s + 2) float32: as `padded_rgba`, 1 / depth, which is linear over a plane; 0 where nothing is."""
-    return padded_plane(s, write, pad_grid(s).ratio)
-
-
 def padded_plane(
     s: int, write: Callable[[int, np.ndarray], object], ratio: np.ndarray | None = None, kind: type = np.float32
 ) -> np.ndarray:
@@ -182,7 +179,7 @@ def resampled_rgb(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
 
 
 def resampled_depth(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
-    """(h, w) float32: the depth that a grid shows of `padded_nearness`; inf where nothing is."""
+    """(h, w) float32: the depth that a grid shows of planes of 1 / depth; inf where nothing is."""
     along, x, y = grid.maps
     nearest, smooth = (cv2.remap(padded, x, y, way) for way in (cv2.INTER_NEAREST, cv2.INTER_LINEAR))
     cv2.copyTo(smooth, cv2.inRange(cv2.divide(smooth, nearest), 1 - CREASE, 1 + CREASE), nearest)

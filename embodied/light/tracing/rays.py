@@ -1,0 +1,55 @@
+"""First hits of rays among bare triangles, with NumPy's arrays in and out: for pictures that are drawn elsewhere."""
+
+from __future__ import annotations
+
+import importlib.util
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from embodied.light.backend import dr, mi, scene_of, vector
+
+if TYPE_CHECKING:
+    from embodied.render.gloss import Rays
+
+
+def rays_among(corners: np.ndarray) -> Rays:
+    """Rays among triangles (m, 3, 3): Embree's, and Mitsuba's on the machines that have no wheels of it.
+
+    Mitsuba is as quick, but its threads wait awake for more work, a third of the processor time of a picture.
+    """
+    return embree(corners) or mitsuba_among(corners)
+
+
+def embree(corners: np.ndarray) -> Rays | None:
+    """Embree's rays among triangles (m, 3, 3), on the thread that asks; None where it is not installed."""
+    if importlib.util.find_spec("embreex") is None:
+        return None
+    from embreex import mesh_construction, rtcore_scene  # late: not for every machine
+
+    scene = rtcore_scene.EmbreeScene()
+    mesh_construction.TriangleMesh(scene, np.ascontiguousarray(corners, np.float32))
+
+    def first(start: np.ndarray, onward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        single = (np.ascontiguousarray(a, np.float32) for a in (start, onward))
+        hit = scene.run(*single, dists=None, output=1)
+        return hit["primID"], hit["tfar"], hit["u"], hit["v"]
+
+    return first
+
+
+def mitsuba_among(corners: np.ndarray) -> Rays:
+    """Rays among triangles by what bakes the light, on all cores."""
+    scene = scene_of(corners)
+
+    def first(start: np.ndarray, onward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        if not len(start):
+            none = np.zeros(0, np.float32)
+            return np.zeros(0, np.int32), none, none, none
+        hit = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(vector(start)), vector(onward)))
+        face, far, uv = hit.prim_index, hit.t, hit.prim_uv
+        dr.eval(face, far, uv)
+        far = np.array(far)
+        return np.where(np.isfinite(far), np.array(face).astype(np.int32), -1), far, np.array(uv.x), np.array(uv.y)
+
+    return first
