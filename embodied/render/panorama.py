@@ -175,7 +175,8 @@ def padded_plane(
 
 def resampled_rgb(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     """(h, w, 3) uint8: what a grid shows of `padded_rgba`."""
-    return cv2.cvtColor(cv2.remap(padded, *grid.maps[1:], cv2.INTER_LINEAR), cv2.COLOR_RGBA2RGB)
+    _, x, y = grid.maps
+    return cv2.cvtColor(cv2.remap(padded, x, y, cv2.INTER_LINEAR), cv2.COLOR_RGBA2RGB)
 
 
 def resampled_depth(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
