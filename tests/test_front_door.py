@@ -135,7 +135,7 @@ def test_a_plan_may_be_written_as_other_programs_write_it(tmp_path, rooms):
         ([{"kind": "hll", "polygon": []}], "has the kind 'hll'; use one of living_room"),
         ([{"kind": "hall"}], "polygon.*a plan is"),
         ([{**ROOMS[0], "name": "x"}], "name.*a plan is"),
-        ([{"kind": "stairwell", "polygon": []}], "has the kind 'stairwell'"),
+        ([{"kind": "attic", "polygon": []}], "has the kind 'attic'"),
         (scaled(100), "look like centimetres: multiply all numbers by 0.01"),
         (scaled(1000), "look like millimetres"),
         (scaled(1 / 0.3048), "look like feet"),

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from embodied.generate.footprint import Rect
 from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.modules import Cell
+
+MOVING = {"hall", "corridor", "stairwell"}
+"""Kinds of room that are there to be walked through."""
+
+
+Pair = tuple[int, int]
 
 
 class SharedWall(NamedTuple):
@@ -58,6 +66,23 @@ def walls_between(cells: list[Cell]) -> dict[tuple[int, int], SharedWall]:
     return shared
 
 
+def ways_between(cells: Sequence[Cell], walls: Mapping[Pair, SharedWall]) -> dict[Pair, SharedWall]:
+    """The walls, or the parts of them, in which a way may be: of a stairwell those beside its floor."""
+    ways: dict[Pair, SharedWall | None] = dict(walls)
+    for i, c in enumerate(cells):
+        if c.floor is not None:
+            ways |= {pair: w and beside_floor(c.floor, w) for pair, w in ways.items() if i in pair}
+    return {pair: w for pair, w in ways.items() if w is not None}
+
+
+def beside_floor(floor: Rect, wall: SharedWall) -> SharedWall | None:
+    """The part of a stairwell's wall that its floor touches."""
+    axis, across, low, high = wall
+    along, sides = (floor[::2], floor[1::2]) if axis == "x" else (floor[1::2], floor[::2])
+    low, high = max(low, along[0]), min(high, along[1])
+    return SharedWall(axis, across, low, high) if across in sides and high > low else None
+
+
 def outer_stretches(
     cells: list[Cell], walls: dict[tuple[int, int], SharedWall], i: int
 ) -> list[tuple[SharedWall, int]]:
@@ -93,21 +118,22 @@ def has_outer_doors(cells: list[Cell], walls: dict[tuple[int, int], SharedWall])
 
 
 def connect(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> tuple[list[Link], float] | None:
-    """The cheapest set of entrances that reaches every cell from the hall, and its cost.
+    """The cheapest set of entrances that reaches every cell from the hall, upstairs from the stairwell, and its cost.
 
-    Grows a tree from the hall (Prim's algorithm) over the permitted entrances, then adds joins.
+    Grows a tree from there (Prim's algorithm) over the permitted entrances, then adds joins.
 
     Returns:
       None where some cell cannot be reached.
     """
-    start = next((i for i, c in enumerate(cells) if c.kind == "hall"), None)
+    start = next((i for kind in ("hall", "stairwell") for i, c in enumerate(cells) if c.kind == kind), None)
     if start is None:
         return None
+    walls = ways_between(cells, walls)
     options: list[list[tuple[float, int, SharedWall]]] = [[] for _ in cells]
     for (i, j), wall in walls.items():
         for child, parent in ((i, j), (j, i)):
             cost, kinds = _cost(cells, child, parent), {cells[child].kind, cells[parent].kind}
-            needed = 9 if kinds <= {"hall", "corridor"} else ROOM_TABLE[cells[child].kind].wall
+            needed = 9 if kinds <= MOVING else ROOM_TABLE[cells[child].kind].wall
             if cost is not None and wall.length >= needed:
                 options[parent].append((cost, child, wall))
     links: list[Link] = []
@@ -162,4 +188,4 @@ def _cost(cells: list[Cell], child: int, parent: int) -> float | None:
         return 0.0 if c.owner == parent else None
     if not ROOM_TABLE[p.kind].leads_on and c.kind not in ROOM_TABLE[p.kind].leads_to:
         return None
-    return ROOM_TABLE[c.kind].entered_from.get(p.kind)
+    return ROOM_TABLE[c.kind].entered_from.get("corridor" if p.kind == "stairwell" else p.kind)

@@ -67,7 +67,7 @@ class HouseConfig:
     shape: str | None = None
     """Shape of the floor plan."""
     storeys: int = 1
-    """Number of storeys; only 1 is implemented."""
+    """Number of storeys, 1 to 3; `area`, `rooms` and `bedrooms` are of all of them."""
     open_plan: bool | None = None
     """Connect kitchen, dining and living room by wide openings."""
     style: str | None = None
@@ -96,6 +96,7 @@ class HouseConfig:
                 raise HouseError(f"area should be (low, high) within {AREAS} m2, got {self.area}")
         _within("rooms", self.rooms, 2, 20)
         _within("bedrooms", self.bedrooms, 1, 12)
+        _within("storeys", self.storeys, 1, 3)
         _within("disorder", self.disorder, 0, 1)
         if self.hour is not None and not 0 <= self.hour < 24:
             raise HouseError(f"hour should lie in [0, 24), got {self.hour}")
@@ -105,10 +106,6 @@ class HouseConfig:
         if self.style is not None and self.style not in styles_of(self.novelty):
             raise HouseError(
                 f"{self.novelty} houses have the styles {styles_of(self.novelty)}, got {self.style!r}; leave style out"
-            )
-        if self.storeys != 1:
-            raise HouseError(
-                f"storeys={self.storeys} cannot be built yet: the generator draws single-storey houses; use storeys=1"
             )
         if self.rooms is not None and self.bedrooms is not None and self.bedrooms > self.rooms - 1:
             raise HouseError(
@@ -123,8 +120,8 @@ class HouseConfig:
         needed = self.least_area()
         if self.area is not None and self.area[1] < needed:
             raise HouseError(
-                f"rooms={self.rooms}, bedrooms={self.bedrooms}, shape={self.shape!r} need at least "
-                f"{needed:.0f} m2, area allows {self.area[1]:.0f}; raise area or ask for fewer rooms"
+                f"rooms={self.rooms}, bedrooms={self.bedrooms}, shape={self.shape!r}, storeys={self.storeys} need at "
+                f"least {needed:.0f} m2, area allows {self.area[1]:.0f}; raise area or ask for fewer rooms"
             )
         if self.area is not None and self.rooms is not None and self.area[0] > self.most_area():
             raise HouseError(
@@ -136,7 +133,8 @@ class HouseConfig:
         """The smallest total area, square metres, that holds what is asked for."""
         rooms = max(self.rooms or 2, (self.bedrooms or 1) + 1)
         shape = {"L": 75.0, "T": 95.0, "U": 150.0, "cross": 210.0}.get(self.shape or "", 0.0)
-        return max(AREAS[0] + 17.0 * (rooms - 2), shape)
+        storey = max(shape, 45.0 if self.storeys > 1 else 0.0)
+        return max(AREAS[0] + 17.0 * (rooms - 2), storey * self.storeys)
 
     def most_area(self) -> float:
         """The largest total area, square metres, that the asked number of main rooms can fill sensibly."""

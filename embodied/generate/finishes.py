@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from embodied.generate.access import MOVING
 from embodied.generate.kinds import BEDROOMS
 from embodied.generate.novelty import finishes_of, styles_of
 from embodied.generate.style_finishes import FINISH_TABLE
 from embodied.house.house import House, Room
 
 WET = ("bathroom", "toilet", "laundry_room")
-MOVING = ("hall", "corridor")
 TALK = ("living_room", "dining_room", "family_room", *MOVING, "library", "study")
 
 

@@ -9,13 +9,22 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from embodied.generate.config import HouseConfig
 
+if TYPE_CHECKING:
+    from embodied.generate.modules import Cell
+
 Rect = tuple[int, int, int, int]
 """x0, y0, x1, y1 in decimetres."""
+
+
+def shared_area(a: Rect, b: Rect) -> int:
+    """Square decimetres that two rectangles share."""
+    return max(0, min(a[2], b[2]) - max(a[0], b[0])) * max(0, min(a[3], b[3]) - max(a[1], b[1]))
 
 
 @dataclass(frozen=True)
@@ -89,6 +98,10 @@ class Footprint:
     caps: tuple[Cap, ...]
     corridor: int
     """Corridor width between wall centre lines; 0 for flats whose hall reaches every room."""
+    wet: tuple[Rect, ...] = ()
+    """Rooms with water on the storey below."""
+    stair: Cell | None = None
+    """The stairwell, of a storey that one enters by stairs; the strips leave it out."""
 
 
 @dataclass(frozen=True)
@@ -120,10 +133,10 @@ def draw_shape(area: float, config: HouseConfig, *, rng: np.random.Generator) ->
     return str(rng.choice(["rectangle", "L", "T", "U"], p=p / p.sum()))
 
 
-def draw_footprint(area: float, shape: str, *, rng: np.random.Generator) -> Footprint:
-    """A footprint of `area` square metres with the corridors of its wings."""
+def draw_footprint(area: float, shape: str, *, flat: bool = True, rng: np.random.Generator) -> Footprint:
+    """A footprint of `area` square metres with the corridors of its wings; small flats have none where `flat`."""
     if shape == "rectangle":
-        return _flat(area, rng) if area < 62 else _bar(area, rng)
+        return _flat(area, rng) if area < 62 and flat else _bar(area, rng)
     if shape == "cross":
         return _crossed(area, rng)
     if area < (260 if shape == "U" else 150):

@@ -9,15 +9,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from embodied.generate.access import Link, connect, has_outer_doors, walls_between
-from embodied.generate.footprint import Band, Cap, Footprint, Rect
+from embodied.generate.access import Link, connect, has_outer_doors, walls_between, ways_between
+from embodied.generate.footprint import Band, Cap, Footprint, Rect, Strip, shared_area
 from embodied.generate.kinds import ROOM_TABLE
-from embodied.generate.modules import Cell, Module, Slot, arrange, draw_modules, width
+from embodied.generate.modules import THROUGH, Cell, Module, Slot, arrange, draw_modules, width
 from embodied.generate.program import WantedRoom
-from embodied.generate.score import score
+from embodied.generate.score import score, worth_above
+from embodied.generate.stairwell import stairwell
 
 LONG = 95
 """Corridors longer than this, decimetres, are divided."""
+BESIDE_STAIRS = 16
+"""Least length of a row that a stairwell leaves on either side, decimetres."""
 PARENTS = 6
 """Candidates kept as parents."""
 MAIN_SUITE = ("main_bedroom", "bathroom")
@@ -54,6 +57,13 @@ class FloorPlan:
     cells: tuple[Cell, ...]
     links: tuple[Link, ...]
     score: float
+    above: tuple[FloorPlan, ...] = ()
+    """The storeys above, from the lowest to the highest; stairwells lie above each other."""
+
+    @property
+    def storeys(self) -> tuple[FloorPlan, ...]:
+        """All storeys, this one first."""
+        return (self, *self.above)
 
 
 @dataclass(frozen=True)
@@ -82,7 +92,7 @@ class Ends:
 
 def draw_plan(
     footprints: Sequence[Footprint], spaces: tuple[WantedRoom, ...], tries: int, *, rng: np.random.Generator
-) -> FloorPlan | None:
+) -> tuple[Footprint, FloorPlan] | None:
     """The best of `tries` candidates: random ones first, then changes of the best so far.
 
     Returns:
@@ -99,7 +109,7 @@ def draw_plan(
         plan = _realised(footprints[genome.footprint], spaces, genome, best[-1][0] if len(best) == PARENTS else -np.inf)
         if plan is not None and all(plan.score != other for other, _, _ in best):
             best = sorted([*best, (plan.score, genome, plan)], key=lambda b: -b[0])[:PARENTS]
-    return best[0][2] if best else None
+    return (footprints[best[0][1].footprint], best[0][2]) if best else None
 
 
 def _changed(genome: Genome, footprints: int, rng: np.random.Generator) -> Genome:
@@ -124,7 +134,7 @@ def _realised(footprint: Footprint, spaces: tuple[WantedRoom, ...], genome: Geno
     if cells is None:
         return None
     walls = walls_between(cells)
-    value = score(cells, walls)
+    value = score(cells, walls) + worth_above(cells, footprint.wet)
     if value <= floor or not has_outer_doors(cells, walls):
         return None
     linked = connect(cells, walls)
@@ -158,11 +168,12 @@ def with_short_corridors(plan: FloorPlan) -> FloorPlan:
         cells[i] = replace(c, rect=parts[0], area=0.0)
         cells += [replace(c, rect=r, area=0.0) for r in parts[1:]]
     linked = connect(cells, walls_between(cells))
-    return plan if linked is None else FloorPlan(tuple(cells), tuple(linked[0]), plan.score)
+    plan = plan if linked is None else replace(plan, cells=tuple(cells), links=tuple(linked[0]))
+    return replace(plan, above=tuple(with_short_corridors(p) for p in plan.above))
 
 
 def turned(plan: FloorPlan, *, rng: np.random.Generator) -> FloorPlan:
-    """The plan mirrored and turned at random, its lower left corner at the origin."""
+    """The plan mirrored and turned at random, with the storeys above; its lower left corner at the origin."""
     flip_x, flip_y, swap = (bool(b) for b in rng.integers(0, 2, 3))
 
     def move(r: Rect) -> Rect:
@@ -175,18 +186,22 @@ def turned(plan: FloorPlan, *, rng: np.random.Generator) -> FloorPlan:
 
     rects = [move(c.rect) for c in plan.cells]
     dx, dy = min(r[0] for r in rects), min(r[1] for r in rects)
-    rects = [(r[0] - dx, r[1] - dy, r[2] - dx, r[3] - dy) for r in rects]
-    cells = tuple(replace(c, rect=r) for c, r in zip(plan.cells, rects))
-    walls = walls_between(list(cells))
-    between = ((min(k.child, k.parent), max(k.child, k.parent)) for k in plan.links)
-    links = tuple(replace(k, wall=walls[pair]) for k, pair in zip(plan.links, between))
-    return FloorPlan(cells, links, plan.score)
+    moved = lambda r: (r[0] - dx, r[1] - dy, r[2] - dx, r[3] - dy)
+
+    def of(plan: FloorPlan) -> FloorPlan:
+        cells = tuple(replace(c, rect=moved(move(c.rect)), floor=c.floor and moved(move(c.floor))) for c in plan.cells)
+        walls = ways_between(cells, walls_between(list(cells)))
+        between = ((min(k.child, k.parent), max(k.child, k.parent)) for k in plan.links)
+        links = tuple(replace(k, wall=walls[pair]) for k, pair in zip(plan.links, between))
+        return FloorPlan(cells, links, plan.score, tuple(of(p) for p in plan.above))
+
+    return of(plan)
 
 
 def _candidate(footprint: Footprint, spaces: tuple[WantedRoom, ...], genome: Genome) -> list[Cell] | None:
     rng = np.random.default_rng(genome.modules)
     modules = draw_modules(spaces, rng=rng)
-    cells: list[Cell] = []
+    cells: list[Cell] = [] if footprint.stair is None else [footprint.stair]
     for cap in footprint.caps:
         chosen = _fill_cap(cap, modules, cells, rng)
         if chosen is None:
@@ -295,7 +310,7 @@ def _assign(
 
 def _slimness(m: Module, depth: int) -> float:
     """Cost, in decimetres of spine, of the fact that the module's main room would be narrow at this depth."""
-    if m.main.kind == "hall":
+    if m.main.kind in THROUGH:
         return 0.0
     own = m.main.area * 100 / depth
     return 45 * max(0.0, max(depth / own, own / depth) - 1.7)
@@ -311,21 +326,40 @@ def _lay(footprint: Footprint, rows: Rows, cells: list[Cell], rng: np.random.Gen
         for end in (0, 1):
             if band.free[end] and flips.pop() > 0.1:
                 _take_end(Ends(footprint, rows, rooms_of, reach), b, end, limits[b])
-    halls: list[tuple[int, int, int]] = []
+    halls = [
+        (b, *_along_band(band, c.rect, band.axis))
+        for c in cells
+        for b, band in enumerate(footprint.bands)
+        if c.floor is not None and shared_area(c.rect, band.rect(0, band.length))
+    ]
+    if any(p < limits[b][0] or q > limits[b][1] for b, p, q in halls):
+        return None
     for i, (s, row) in enumerate(zip(footprint.strips, rows)):
         for k, (m, wanted) in enumerate(row):
             slot = Slot(s, *rooms_of[i][k], corridor, mirrored=flips.pop() < 0.5, inner=reach.get((i, k), 0))
             made = arrange(m, slot, wanted, first=len(cells))
+            if made is not None and m.main.kind == "stairwell":
+                made = _with_stairs(made[0].rect, s, rooms_of[i][k], corridor)
             if made is None:
                 return None
-            if m.main.kind == "hall" and corridor:
+            if m.main.kind in THROUGH and corridor:
                 p, q = _along_band(footprint.bands[s.band], made[0].rect, s.axis)
                 if p < limits[s.band][0] or q > limits[s.band][1]:
                     return None
                 halls.append((s.band, p, q))
             cells += made
+    if any(b == c and min(q, s) > max(p, r) for (b, p, q), (c, r, s) in itertools.combinations(halls, 2)):
+        return None
     corridors = _corridors(footprint, limits, halls)
     return None if corridors is None else cells + corridors
+
+
+def _with_stairs(rect: Rect, s: Strip, place: tuple[int, int], corridor: int) -> list[Cell] | None:
+    """The stairwell at a place of its row; None where no stair fits, or no room would fit beside it upstairs."""
+    if any(0 < rest < BESIDE_STAIRS for rest in (place[0], s.length - place[1])):
+        return None
+    cell = stairwell(rect, (0, -s.out) if s.axis == "x" else (-s.out, 0), corridor)
+    return None if cell is None else [cell]
 
 
 def _cut(footprint: Footprint, rows: Rows) -> list[list[tuple[int, int]]]:
@@ -371,7 +405,7 @@ def _take_end(ends: Ends, b: int, end: int, limits: list[int]) -> None:
             k = 0 if end == 0 else len(rows[i]) - 1
             a, z = ends.cuts[i][k]
             at_end.append((z - a, i, k))
-    if len(at_end) < 2 or any(rows[i][k][0].main.kind == "hall" for _, i, k in at_end):
+    if len(at_end) < 2 or any(rows[i][k][0].main.kind in THROUGH for _, i, k in at_end):
         return
     at_end.sort()
     (short, i, k), (long, _, _) = at_end[0], at_end[1]

@@ -12,6 +12,8 @@ from embodied.generate.program import WantedRoom
 
 FILLERS = {"kitchen": "pantry", **dict.fromkeys((*BEDROOMS, "hall", "study", "laundry_room"), "closet")}
 """Kind of room that a leftover niche beside such a room becomes."""
+THROUGH = ("hall", "stairwell")
+"""Kinds that take the corridor's width where they lie along it."""
 NICHE = 12
 """Shortest side of a niche worth a door, decimetres."""
 
@@ -26,6 +28,10 @@ class Cell:
     """Wanted area, square metres."""
     owner: int | None = None
     """Index of the cell it is entered from."""
+    floor: Rect | None = None
+    """Of a stairwell: its part along one side where one walks on both storeys."""
+    least: int = 0
+    """Of a stairwell: the depth that this part was asked to have, decimetres."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +99,7 @@ def draw_modules(spaces: tuple[WantedRoom, ...], *, rng: np.random.Generator) ->
 
 def width(module: Module, depth: int, corridor: int) -> int:
     """The wanted width, decimetres, in a row of `depth`."""
-    deep = depth + (corridor if module.main.kind == "hall" else 0)
+    deep = depth + (corridor if module.main.kind in THROUGH else 0)
     least = _least(module.main.kind)
     main, small = max(least, round(module.main.area * 100 / deep)), _small_rooms(module)
     return main + _column(small, depth) if small else main
@@ -112,7 +118,7 @@ def arrange(module: Module, slot: Slot, wanted: int, *, first: int = 0) -> list[
       wanted: its width(), decimetres, which the slot may exceed or fall short of.
       first: index that the first returned cell will have; owners refer to it.
     """
-    h, v0 = slot.strip.depth, -slot.corridor if module.main.kind == "hall" else -slot.inner
+    h, v0 = slot.strip.depth, -slot.corridor if module.main.kind in THROUGH else -slot.inner
     small = _small_rooms(module)
     if not small:
         return [slot.cell(module.main, slot.start, slot.end, v0, h)]

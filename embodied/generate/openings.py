@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from embodied.generate.access import Link, SharedWall, outer_stretches, walls_between
+from embodied.generate.access import MOVING, Link, Pair, SharedWall, beside_floor, outer_stretches, walls_between
 from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.layout import FloorPlan
 from embodied.generate.modules import Cell
 from embodied.house.house import Opening, rounded
 
 Point = tuple[float, float]
-CIRCULATION = {"hall", "corridor"}
 NIB = 0.16
 """From a wall's centre-line corner to the jamb: half an inner wall and 0.1 m, metres."""
 FRENCH = {"living_room": 1.0, "sun_room": 1.0, "family_room": 0.8, "dining_room": 0.35, "library": 0.12}
@@ -75,6 +75,7 @@ class _Openings:
     outside: list[list[OuterWall]]
     free: dict[tuple[int, int], list[tuple[float, float]]]
     """(cell, index of its outer wall) to the intervals of it without openings, metres."""
+    storey: int = 0
     found: list[Opening] = field(default_factory=list)
     swings: list[Rectangle] = field(default_factory=list)
     stands: list[Rectangle] = field(default_factory=list)
@@ -117,31 +118,49 @@ class _Openings:
             self.swings.append(_swing(w.axis, w.across, start, start + width, -w.side))
 
 
-def outer_walls(cells: tuple[Cell, ...], walls: dict[tuple[int, int], SharedWall]) -> list[list[OuterWall]]:
-    """For each cell its stretches of outer wall, longest first."""
-    return [
-        [
-            OuterWall(cell=i, index=k, axis=w.axis, across=w.across / 10, low=w.low / 10, high=w.high / 10, side=side)
-            for k, (w, side) in enumerate(outer_stretches(list(cells), walls, i))
-        ]
-        for i in range(len(cells))
-    ]
+def outer_walls(cells: tuple[Cell, ...], walls: dict[Pair, SharedWall], climbs: bool) -> list[list[OuterWall]]:
+    """For each cell its stretches of outer wall, longest first; of a stairwell that `climbs` those beside its floor."""
+    outer: list[list[OuterWall]] = []
+    for i, c in enumerate(cells):
+        stretches = outer_stretches(list(cells), walls, i)
+        if c.floor is not None and climbs:
+            stretches = [(part, side) for w, side in stretches if (part := beside_floor(c.floor, w)) is not None]
+        metres = ((k, w.axis, w.across / 10, w.low / 10, w.high / 10, side) for k, (w, side) in enumerate(stretches))
+        outer.append([OuterWall(i, *m) for m in metres])
+    return outer
 
 
 def draw_openings(
-    plan: FloorPlan, names: tuple[str, ...], leaves: Leaves, height: float, open_plan: bool, *, rng: np.random.Generator
+    plans: Sequence[FloorPlan],
+    names: Sequence[tuple[str, ...]],
+    leaves: Leaves,
+    height: float,
+    open_plan: bool,
+    *,
+    rng: np.random.Generator,
 ) -> tuple[Opening, ...]:
-    """All openings of a plan.
+    """All openings of the storeys of a plan.
 
     Args:
-      names: room id of each cell.
+      names: for each storey the room id of each cell.
       height: clear storey height, metres.
       open_plan: whether living, dining and kitchen join through wide openings.
     """
-    outside = outer_walls(plan.cells, walls_between(list(plan.cells)))
-    free = {(w.cell, w.index): [(w.low, w.high)] for walls in outside for w in walls}
-    made = _Openings(plan=plan, names=names, leaves=leaves, outside=outside, free=free)
-    _front_door(made, rng)
+    openings: list[Opening] = []
+    counts: Counter[str] = Counter()
+    for storey, (plan, own) in enumerate(zip(plans, names, strict=True)):
+        outside = outer_walls(plan.cells, walls_between(list(plan.cells)), climbs=storey + 1 < len(plans))
+        free = {(w.cell, w.index): [(w.low, w.high)] for walls in outside for w in walls}
+        made = _Openings(plan, own, leaves, outside, free, storey, counts=counts)
+        _draw_storey(made, height, open_plan, rng)
+        openings += made.found
+    return tuple(openings)
+
+
+def _draw_storey(made: _Openings, height: float, open_plan: bool, rng: np.random.Generator) -> None:
+    plan = made.plan
+    if made.storey == 0:
+        _front_door(made, rng)
     wide = [k for k in plan.links if _is_wide(plan, k)]
     for link in wide:
         _passage(made, link, height, open_plan, rng)
@@ -152,13 +171,12 @@ def draw_openings(
     _outer_doors(made, rng)
     for i in range(len(plan.cells)):
         _windows(made, i, height, rng)
-    return tuple(made.found)
 
 
 def _is_wide(plan: FloorPlan, link: Link) -> bool:
     """True if a way through is a passage without a leaf."""
     kinds = {plan.cells[link.child].kind, plan.cells[link.parent].kind}
-    return all(ROOM_TABLE[k].is_open for k in kinds) or kinds <= CIRCULATION or kinds == {"hall", "living_room"}
+    return all(ROOM_TABLE[k].is_open for k in kinds) or kinds <= MOVING or kinds == {"hall", "living_room"}
 
 
 def _jambs(cell: Cell, axis: str, across: float, low: float, high: float) -> tuple[Point, Point]:
@@ -186,7 +204,7 @@ def _passage(made: _Openings, link: Link, height: float, open_plan: bool, rng: n
         width = min(width, 1.2)
     slack = room - width
     where = float(rng.choice([0, 0.5, 1]))
-    middle = (kinds <= CIRCULATION or open_plan) and not tight
+    middle = (kinds <= MOVING or open_plan) and not tight
     start = low + NIB + slack * (0.5 if middle else round(where) if tight else where)
     head = round(min(height - 0.15, float(rng.choice([2.2, 2.3, 2.4]))), 2)
     made.zones.append(_front(axis, across, start, start + width))
@@ -196,7 +214,7 @@ def _passage(made: _Openings, link: Link, height: float, open_plan: bool, rng: n
 
 def _passage_width(kinds: set[str], room: float, open_plan: bool, rng: np.random.Generator) -> float:
     """Wanted width of a passage between two kinds in `room` metres of wall."""
-    if kinds <= CIRCULATION:
+    if kinds <= MOVING:
         return 1.4
     if "hall" in kinds:
         return float(rng.choice([1.0, 1.4, 1.8]))
@@ -299,6 +317,8 @@ def _folded_door(made: _Openings, link: Link, rng: np.random.Generator) -> bool:
     """A leaf that opens outwards and folds back on the wall beside it; False where other doors leave no place."""
     axis, (across, low, high) = link.wall.axis, _wall_metres(link)
     outer = made.plan.cells[link.parent]
+    if outer.kind == "stairwell":
+        return False
     own, side = _span_and_side(outer, axis, across)
     width = min(ROOM_TABLE[made.plan.cells[link.child].kind].door, high - low - 2 * NIB)
     k = 0 if axis == "x" else 1
@@ -353,7 +373,7 @@ def _outer_doors(made: _Openings, rng: np.random.Generator) -> None:
             _garage_door(made, i)
         elif c.kind in FRENCH or c.kind == "main_bedroom":
             _french_window(made, i, rng)
-        elif c.kind in UTILITY and not back and rng.random() < 0.3:
+        elif c.kind in UTILITY and not back and made.storey == 0 and rng.random() < 0.3:
             back = _back_door(made, i, rng)
 
 

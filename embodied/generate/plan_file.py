@@ -4,11 +4,13 @@
                {"kind": "living_room", "polygon": [[1.6, 0], [7, 0], [7, 6], [1.6, 6]]}]}
 
 Polygons are metres, on a grid of 0.1 m, along the middle of the walls. Each is a rectangle along x and y; an L-shaped
-room is two rectangles of its kind. A house has exactly one storey and at least one hall, where one enters.
+room is two rectangles of its kind. A house has at least one hall, where one enters. Rooms upstairs have `"storey": 1`;
+a stair is a room of kind 'stairwell' on each of the storeys that it joins, with the same polygon.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 import statistics
@@ -20,25 +22,26 @@ from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import RecordError, load_json
 from embodied.generate.access import connect, has_outer_doors, walls_between
 from embodied.generate.config import HouseConfig
-from embodied.generate.footprint import Rect
+from embodied.generate.footprint import Rect, shared_area
 from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.layout import FloorPlan
 from embodied.generate.modules import Cell
 from embodied.generate.stages import DEFAULT, STAGES, generate_house, with_plan
+from embodied.generate.stairwell import stairwells
 from embodied.house.house import House, HouseError
 
 GRID = 10
 """Steps of the grid in a metre."""
 NOISE = 1e-3
 """How far a corner may lie from the grid, metres."""
-MOST_ROOMS = 200
+MOST_ROOMS, MOST_STOREYS = 200, 3
 MOST_FLOOR, WIDEST_PLAN, FARTHEST_CORNER = 1500.0, 120.0, 1000.0
 """Largest plan: square metres, metres across, and metres from the origin."""
 UNITS = {"feet": 0.3048, "centimetres": 0.01, "inches": 0.0254, "millimetres": 0.001}
 """Units that other programs write plans in, metres."""
 OVERSIZE, USUAL = 3.0, 0.6
 """Times the largest usual area of its kind that the median room may have, and has."""
-DECIDED = ("area", "rooms", "bedrooms", "shape")
+DECIDED = ("area", "rooms", "bedrooms", "shape", "storeys")
 """Fields of HouseConfig that a plan leaves no choice of."""
 Corners = tuple[tuple[float, float], ...]
 
@@ -48,6 +51,7 @@ class PlannedRoom:
     kind: str
     polygon: Corners
     """Metres, along the middle of the walls; the first corner may be repeated at the end."""
+    storey: int = 0
 
 
 @dataclass(frozen=True)
@@ -71,11 +75,34 @@ def load_plan(path: Path) -> FloorPlan:
         raise HouseError(f'{e}; a plan is {{"rooms": [{{"kind": ..., "polygon": [[x, y], ...]}}, ...]}}') from e
     if len(rooms) > MOST_ROOMS:
         raise HouseError(f"{path} has {len(rooms)} rooms, a plan may have {MOST_ROOMS}")
+    if astray := [(n, r.storey) for n, r in enumerate(rooms) if not 0 <= r.storey < MOST_STOREYS]:
+        number, storey = astray[0]
+        raise HouseError(f"room {number} is on storey {storey}; a plan may have the storeys 0 to {MOST_STOREYS - 1}")
     if unknown := [(n, r.kind) for n, r in enumerate(rooms) if r.kind not in ROOM_TABLE]:
         number, kind = unknown[0]
         raise HouseError(f"room {number} has the kind {kind!r}; use one of {', '.join(ROOM_TABLE)}")
     _check_size(rooms)
-    return plan_of([_cell(number, room) for number, room in enumerate(rooms)])
+    storeys: list[list[Cell]] = [[] for _ in range(max(r.storey for r in rooms) + 1)]
+    for number, room in enumerate(rooms):
+        storeys[room.storey].append(_cell(number, room))
+    return plan_of(storeys[0]) if len(storeys) == 1 else _plan_of_storeys(storeys)
+
+
+def _plan_of_storeys(storeys: Sequence[list[Cell]]) -> FloorPlan:
+    wells = [[c.rect for c in cells if c.kind == "stairwell"] for cells in storeys]
+    if any(len(rects) != 1 or rects != wells[0] for rects in wells):
+        raise HouseError(
+            f"each of {len(storeys)} storeys needs one room of kind 'stairwell', with one polygon, got {wells} (dm)"
+        )
+    for well in stairwells(wells[0][0]):
+        own = [[well if c.kind == "stairwell" else c for c in cells] for cells in storeys]
+        try:
+            ground, *above = (plan_of(cells, upstairs=k > 0) for k, cells in enumerate(own))
+        except HouseError as e:
+            wrong = e
+        else:
+            return dataclasses.replace(ground, above=tuple(above))
+    raise wrong
 
 
 def _check_size(rooms: Sequence[PlannedRoom]) -> None:
@@ -112,21 +139,19 @@ def _box(corners: Sequence[tuple[float, float]]) -> tuple[float, float, float, f
     return min(xs), min(ys), max(xs), max(ys)
 
 
-def plan_of(cells: list[Cell]) -> FloorPlan:
-    """The cells with the ways between them.
+def plan_of(cells: list[Cell], *, upstairs: bool = False) -> FloorPlan:
+    """The cells of a storey with the ways between them.
 
     Raises:
       HouseError: no hall, no room for the front door, cells that overlap or cannot be reached.
     """
     for (i, a), (j, b) in itertools.combinations(enumerate(cells), 2):
-        if min(a.rect[2], b.rect[2]) > max(a.rect[0], b.rect[0]) and min(a.rect[3], b.rect[3]) > max(
-            a.rect[1], b.rect[1]
-        ):
+        if shared_area(a.rect, b.rect):
             raise HouseError(f"rooms {i} ({a.kind}) and {j} ({b.kind}) overlap; let them share an edge instead")
-    if not any(c.kind == "hall" for c in cells):
+    if not upstairs and not any(c.kind == "hall" for c in cells):
         raise HouseError("a plan needs a room of kind 'hall', where the front door is")
     walls = walls_between(cells)
-    if not has_outer_doors(cells, walls):
+    if not upstairs and not has_outer_doors(cells, walls):
         raise HouseError("a hall needs 1.4 m of outer wall for the front door, a garage 2.9 m for its own")
     linked = connect(cells, walls)
     if linked is None:
@@ -148,7 +173,7 @@ def house_of_plan(
     Examples:
       >>> mine = embodied.house_of_plan(plan, seed=3)
     """
-    if given := [name for name in DECIDED if getattr(config, name) is not None]:
+    if given := [name for name in DECIDED if getattr(config, name) != getattr(DEFAULT, name)]:
         raise HouseError(f"a floor plan decides {', '.join(DECIDED)}; leave out {', '.join(given)}")
     return generate_house(seed, config, catalogue, {**STAGES, "rooms": with_plan(plan)})
 

@@ -48,6 +48,7 @@ def draw_program(area: float, config: HouseConfig, *, rng: np.random.Generator) 
     Returns:
       Spaces whose areas sum to `area` less the circulation that a corridor will take.
     """
+    area -= 9.0 * config.storeys * (config.storeys > 1)  # stairs
     bedrooms = config.bedrooms or _bedrooms(area, config, rng)
     spaces = [WantedRoom("hall", float(np.clip(0.045 * area, 3.0, 13.0)))]
     living = float(np.clip(rng.normal(0.2, 0.025) * area, 14, np.interp(area, (260, 500), (38, 52))))
@@ -73,7 +74,7 @@ def draw_program(area: float, config: HouseConfig, *, rng: np.random.Generator) 
     if area > rng.uniform(75, 150):
         spaces.append(WantedRoom("laundry_room", float(np.clip(0.04 * area, 3.8, 8))))
     spaces = _extras(spaces, area, config, rng)
-    return _scaled(spaces, 0.925 * area if area > 62 else area)
+    return scaled(spaces, 0.925 * area if area > 62 else area)
 
 
 def _bedrooms(area: float, config: HouseConfig, rng: np.random.Generator) -> int:
@@ -150,7 +151,7 @@ def _another(
     return WantedRoom(kind, extras[kind].size * (1 + 0.35 * grow))
 
 
-def _scaled(spaces: list[WantedRoom], total: float) -> tuple[WantedRoom, ...]:
+def scaled(spaces: list[WantedRoom], total: float) -> tuple[WantedRoom, ...]:
     """The same rooms stretched to sum to `total`, none more than a tenth beyond what is usual while that can be met."""
     factor, usual = 1.0, [(s.area, *ROOM_TABLE[s.kind].area) for s in spaces]
     for _ in range(12):

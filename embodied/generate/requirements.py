@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from embodied.assets.catalogue import Catalogue
+from embodied.generate.access import MOVING
 from embodied.generate.furnish.tables import tables, tables_of
 from embodied.generate.kinds import BEDROOMS
 from embodied.house.house import DOORS, House
@@ -37,6 +38,6 @@ def _through_rooms(house: House) -> list[str]:
     """The bedrooms of a house that one enters through another room only."""
     if house.area <= FLAT:
         return []
-    moving = {r.id for r in house.rooms if r.kind in ("hall", "corridor")}
+    moving = {r.id for r in house.rooms if r.kind in MOVING}
     entered = {name for o in house.openings if o.kind in DOORS and moving & {*o.rooms} for name in o.rooms}
     return [f"{r.id}: way from a hall or corridor" for r in house.rooms if r.kind in BEDROOMS and r.id not in entered]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from embodied.generate.access import SharedWall
+from embodied.generate.footprint import Rect, shared_area
 from embodied.generate.kinds import NEIGHBOUR_VALUES, ROOM_TABLE
 from embodied.generate.modules import Cell
 
@@ -41,7 +42,7 @@ def score(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> float:
             continue
         kind = ROOM_TABLE[c.kind]
         least, most = kind.area
-        if c.kind == "hall":
+        if c.kind in ("hall", "stairwell"):
             moving += 0.5 * area
         value -= 0.3 * max(0.0, kind.side * 10 - short) if c.kind != "hall" else 0.5 * max(0, 14 - short)
         if area < least:
@@ -61,3 +62,9 @@ def score(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> float:
         if c.kind in ("living_room", "family_room", "sun_room"):
             value += 0.4 * min(outer / 60, 2.0)
     return value - 18.0 * max(0.0, moving / total - 0.1)
+
+
+def worth_above(cells: list[Cell], wet: tuple[Rect, ...]) -> float:
+    """Worth of the bathrooms that lie above rooms with water, whose pipes they share."""
+    baths = [c.rect for c in cells if c.kind in ("bathroom", "toilet")] if wet else []
+    return 1.5 * sum(any(shared_area(a, b) > 100 for b in wet) for a in baths)

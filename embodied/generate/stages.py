@@ -6,7 +6,7 @@ import dataclasses
 import itertools
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import SupportsIndex, TypeVar
 
@@ -23,9 +23,11 @@ from embodied.generate.novelty import furnishable
 from embodied.generate.openings import Leaves, draw_openings
 from embodied.generate.program import WantedRoom, draw_area, draw_program
 from embodied.generate.requirements import missing_requirements
+from embodied.generate.stairwell import SLAB, TALLEST, stair_of
+from embodied.generate.storeys import draw_storeys
 from embodied.generate.walkways import remove_blocking_objects
 from embodied.geometry import wrap
-from embodied.house.house import House, HouseError, Room, Sky, Storey, check
+from embodied.house.house import House, HouseError, Room, Sky, Stair, Storey, check
 from embodied.house.shapes import inward
 from embodied.navigation.graph import unreachable_rooms
 from embodied.seeds import checked_seed, stream
@@ -74,13 +76,12 @@ def _made(value: Made | None, stage: str) -> Made:
 
 
 def footprint(draft: Draft) -> Draft:
-    """Total area, shape and thirty footprints of it."""
+    """Total area, shape and thirty footprints of it; houses of several storeys draw theirs with their rooms."""
     area = draw_area(draft.config, rng=stream(draft.seed, "house", "area"))
-    rng = stream(draft.seed, "house", "footprint")
-    shape = draw_shape(area, draft.config, rng=rng)
-    return dataclasses.replace(
-        draft, area=area, shape=shape, footprints=tuple(draw_footprint(area, shape, rng=rng) for _ in range(30))
-    )
+    rng, storeys = stream(draft.seed, "house", "footprint"), draft.config.storeys
+    shape = draw_shape(area / storeys, draft.config, rng=rng)
+    footprints = tuple(draw_footprint(area, shape, rng=rng) for _ in range(30)) if storeys == 1 else ()
+    return dataclasses.replace(draft, area=area, shape=shape, footprints=footprints)
 
 
 def program(draft: Draft) -> Draft:
@@ -94,10 +95,17 @@ def rooms(draft: Draft) -> Draft:
     """The best of many plans."""
     rng = stream(draft.seed, "house", "rooms", draft.attempt)
     footprints, spaces = draft.footprints, draft.spaces
+    storeys = draft.config.storeys
     if draft.attempt:
-        footprints = tuple(draw_footprint(draft.area, draft.shape, rng=rng) for _ in range(24))
+        if storeys == 1:
+            footprints = tuple(draw_footprint(draft.area, draft.shape, rng=rng) for _ in range(24))
         spaces = draw_program(draft.area, draft.config, rng=rng)
-    plan = draw_plan(footprints, spaces, min(1500, max(550, PLAN_TRIES // len(spaces))), rng=rng)
+    tries = min(1500, max(550, PLAN_TRIES // len(spaces)))
+    if storeys == 1:
+        drawn = draw_plan(footprints, spaces, tries, rng=rng)
+        plan = None if drawn is None else drawn[1]
+    else:
+        plan = draw_storeys(draft.area, draft.shape, spaces, storeys, tries, rng=rng)
     if plan is None:
         raise DeadEndError(
             f"no walkable plan of {draft.area:.0f} m2 with {len(draft.spaces)} rooms on a {draft.shape} footprint; "
@@ -108,7 +116,7 @@ def rooms(draft: Draft) -> Draft:
 
 def with_plan(plan: FloorPlan) -> Stage:
     """A stage that takes the place of `rooms`: this plan in every attempt."""
-    spaces = tuple(WantedRoom(c.kind, c.area) for c in plan.cells)
+    spaces = tuple(WantedRoom(c.kind, c.area) for p in plan.storeys for c in p.cells)
     area = sum(s.area for s in spaces)
     return lambda draft: dataclasses.replace(
         draft, redraws=draft.attempt, plan=plan, spaces=spaces, area=area, shape="rectangle"
@@ -131,33 +139,48 @@ def _bare_house(draft: Draft, palette: Palette, rng: np.random.Generator) -> Hou
     disorder = draft.config.disorder
     if disorder is None:
         disorder = round(float(stream(draft.seed, "house", "disorder").beta(1.6, 2.2)), 3)
-    plan = _made(draft.plan, "rooms")
-    names = _names(plan)
+    plans = _made(draft.plan, "rooms").storeys
+    names = _names(plans)
     height = round(float(rng.choice([2.45, 2.5, 2.6, 2.7, 2.9, 3.0], p=[0.15, 0.25, 0.3, 0.17, 0.08, 0.05])), 2)
+    if len(plans) > 1:
+        height = min(height, TALLEST)
     open_plan = draft.config.open_plan
     if open_plan is None:
         open_plan = bool(rng.random() < 0.6)
     leaves = Leaves(palette.door, palette.front_door, palette.frame)
+    storeys = tuple(Storey(round(k * (height + SLAB), 2), height) for k in range(len(plans)))
+    openings = draw_openings(plans, names, leaves, height, open_plan, rng=rng)
     return House(
         seed=draft.seed,
         name=_title(draft),
-        storeys=(Storey(0.0, height),),
-        rooms=tuple(_bare_room(c, name, palette) for c, name in zip(plan.cells, names)),
-        openings=draw_openings(plan, names, leaves, height, open_plan, rng=rng),
+        storeys=storeys,
+        rooms=tuple(_bare_room(c, name, palette, k) for k, p in enumerate(plans) for c, name in zip(p.cells, names[k])),
+        openings=openings,
         placements=(),
         lights=(),
         style=palette.style,
         disorder=disorder,
+        stairs=_stairs(plans, names, storeys, rng),
     )
 
 
-def _names(plan: FloorPlan) -> tuple[str, ...]:
-    """'<kind>_<number>' for each cell."""
+def _names(plans: Sequence[FloorPlan]) -> list[tuple[str, ...]]:
+    """'<kind>_<number>' for each cell of each storey."""
     numbers: defaultdict[str, Iterator[int]] = defaultdict(lambda: itertools.count(1))
-    return tuple(f"{c.kind}_{next(numbers[c.kind])}" for c in plan.cells)
+    return [tuple(f"{c.kind}_{next(numbers[c.kind])}" for c in p.cells) for p in plans]
 
 
-def _bare_room(cell: Cell, name: str, palette: Palette) -> Room:
+def _stairs(
+    plans: Sequence[FloorPlan], names: Sequence[tuple[str, ...]], storeys: Sequence[Storey], rng: np.random.Generator
+) -> tuple[Stair, ...]:
+    """The stairs between each storey and the next, above each other."""
+    wells = [(c, name) for p, own in zip(plans, names) for c, name in zip(p.cells, own) if c.kind == "stairwell"]
+    mirrored = bool(rng.random() < 0.5) if wells else False
+    joined = zip(itertools.pairwise(wells), itertools.pairwise(storeys))
+    return tuple(stair_of(low[0], (low[1], high[1]), pair, mirrored) for (low, high), pair in joined)
+
+
+def _bare_room(cell: Cell, name: str, palette: Palette, storey: int) -> Room:
     x0, y0, x1, y1 = (v / 10 for v in cell.rect)
     return Room(
         id=name,
@@ -167,6 +190,7 @@ def _bare_room(cell: Cell, name: str, palette: Palette) -> Room:
         wall_finish=palette.walls[0],
         ceiling_finish=palette.ceiling,
         skirting_finish=palette.skirting,
+        storey=storey,
     )
 
 
@@ -279,4 +303,6 @@ def _title(draft: Draft) -> str:
     beds = sum(s.kind in ("main_bedroom", "bedroom", "kids_room", "guest_room") for s in draft.spaces)
     shape = "" if draft.shape == "rectangle" else f"{draft.shape}-shaped "
     what = "flat" if draft.area < 75 else "house"
-    return f"{shape}{what} with {beds} bedroom{'s' if beds != 1 else ''}, {draft.area:.0f} m2"
+    storeys = len(_made(draft.plan, "rooms").storeys)
+    high = f"{storeys}-storey " if storeys > 1 else ""
+    return f"{shape}{high}{what} with {beds} bedroom{'s' if beds != 1 else ''}, {draft.area:.0f} m2"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import shapely
+
 from embodied.assets.records import Asset
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.space import Thing, box, overlap
@@ -16,7 +18,7 @@ def ceiling_lamps(ctx: Context) -> None:
     if lamp is None:
         return
     tables = ctx.roles("dining table", "kitchen island")
-    x0, y0, x1, y1 = space.polygon.bounds
+    x0, y0, x1, y1 = space.ceiling.bounds
     wx, wy = x1 - x0, y1 - y0
     nx = max(1, round(wx / 3.6)) if wx > 4.6 else 1
     ny = max(1, round(wy / 3.6)) if wy > 4.6 else 1
@@ -27,15 +29,16 @@ def ceiling_lamps(ctx: Context) -> None:
         pendant = ctx.pick("fine pendant", most=(1.4, 1.4, 1.8)) or lamp
         if hang_from_ceiling(ctx, pendant, table.x, table.y, table.z + table.size[2] + 0.7):
             spots.append((table.x, table.y))
-    centre = space.polygon.centroid
-    if not space.polygon.contains(centre):
-        centre = space.polygon.representative_point()
+    centre = space.ceiling.centroid
+    if not space.ceiling.contains(centre):
+        centre = space.ceiling.representative_point()
     for i in range(nx):
         for j in range(ny):
             x, y = x0 + (i + 0.5) * wx / nx, y0 + (j + 0.5) * wy / ny
             if nx * ny == 1:
                 x, y = centre.x, centre.y
-            if any(math.hypot(x - a, y - b) < 1.5 for a, b in spots):
+            below = space.ceiling.contains(shapely.Point(x, y))
+            if not below or any(math.hypot(x - a, y - b) < 1.5 for a, b in spots):
                 continue
             if hang_from_ceiling(ctx, lamp, x, y):
                 spots.append((x, y))
@@ -50,11 +53,11 @@ def detectors(ctx: Context) -> None:
     if ctx.has("fans") and ctx.chance(0.12):
         fan = ctx.pick("ceiling fan")
         if fan is not None:
-            hang_from_ceiling(ctx, fan, ctx.space.polygon.centroid.x, ctx.space.polygon.centroid.y)
+            hang_from_ceiling(ctx, fan, ctx.space.ceiling.centroid.x, ctx.space.ceiling.centroid.y)
     if not ctx.has("smoke detectors") or not ctx.chance(0.6):
         return
     asset = ctx.pick("smoke detector")
-    c = ctx.space.polygon.representative_point()
+    c = ctx.space.ceiling.representative_point()
     if asset is not None:
         for dx, dy in ((0.6, 0.0), (0.0, 0.6), (-0.6, 0.0)):
             if hang_from_ceiling(ctx, asset, c.x + dx, c.y + dy):

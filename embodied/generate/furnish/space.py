@@ -18,6 +18,7 @@ import shapely
 
 from embodied.assets.records import Asset
 from embodied.house.house import DOORS, House, Opening, Room, Stair
+from embodied.house.shapes import well_of
 from embodied.navigation.free_space import LOW
 
 Params = tuple[tuple[str, str | float], ...]
@@ -169,6 +170,8 @@ class RoomSpace:
     """z of its floor, metres."""
     height: float
     polygon: shapely.Polygon
+    ceiling: shapely.Geometry
+    """`polygon`, without the opening of stairs that lead up."""
     walls: tuple[Wall, ...]
     openings: tuple[Opening, ...]
     entries: tuple[tuple[float, float], ...]
@@ -343,6 +346,7 @@ def room_space(house: House, room: Room) -> RoomSpace:
             keepouts.extend(_opening_keepouts(wall, s0, s1, o, room, storey.elevation, floor.area))
             if o.kind in DOORS:
                 entries.append(wall.point((s0 + s1) / 2, radius + 0.1))
+    wells = [well_of(s) for s in house.stairs if s.rooms[0] == room.id]
     flights = [
         b
         for stair in house.stairs
@@ -358,6 +362,7 @@ def room_space(house: House, room: Room) -> RoomSpace:
         bottom=storey.elevation,
         height=storey.height,
         polygon=floor,
+        ceiling=floor.difference(shapely.union_all(wells)) if wells else floor,
         walls=walls,
         openings=openings,
         entries=tuple(entries),
@@ -467,6 +472,9 @@ def _leaf(wall: Wall, s0: float, s1: float, o: Opening) -> Box:
 
 def _stair_keepouts(stair: Stair, z: float, height: float) -> list[Box]:
     boxes, path = [], stair.path
+    if len(stair.well) == 4:  # with what lies between two flights
+        (x0, y0), (x1, y1) = np.min(stair.well, axis=0), np.max(stair.well, axis=0)
+        boxes.append(box((x0 + x1) / 2, (y0 + y1) / 2, x1 - x0, y1 - y0, 0.0, z, z + height))
     for (ax, ay, _), (bx, by, _) in itertools.pairwise(path):
         length = math.hypot(bx - ax, by - ay)
         if length < 1e-6:
