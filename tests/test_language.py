@@ -75,6 +75,7 @@ def test_what_every_speaker_says_is_read_back_as_it_was_meant(lexicon):
 
 
 SLOTS = {"side": "left", "room": "kitchen", "other": "study", "metres": "three meters", "steps": "one big step"}
+SLOTS |= {"way": "up", "upstairs": "upstairs"}
 SLOTS |= {"nth": "second", "thing": "the nice red sofa", "walk": "make your way", "soon": "at once"}
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from embodied.geometry import wrap
 from embodied.house.house import Placement
 from embodied.interface import STEP, FindDescribed, Intention, Place, Reply, Situation, Subtask
-from embodied.language.plain_language import PlainLanguage
+from embodied.language.plain_language import PlainLanguage, floors_away
 from embodied.language.templates import intention_of
 from embodied.navigation.graph import nearest
 from embodied.tasks.ask import Look
@@ -120,13 +120,13 @@ def _goal(s: Situation) -> FindDescribed:
 
 def _region(s: Situation) -> tuple[str, set[str]]:
     goal, house = _goal(s), s.world.house
-    kind_of = {p: house.room_by_id[house.placement_by_id[p].room].kind for p in (*goal.fitting, *goal.similar)}
-    kind = kind_of[goal.placement]
-    several = sum(r.kind == kind for r in house.rooms) > 1
+    room_of = {p: house.room_by_id[house.placement_by_id[p].room] for p in (*goal.fitting, *goal.similar)}
+    room = room_of[goal.placement]
+    same, kind = [r.id for r in house.rooms if (r.kind, r.storey) == (room.kind, room.storey)], room.kind
+    several, floor = len(same) > 1, floors_away(house, s.world.graph.room_of_node[s.pose.node], room.id)
     name = kind.replace("_", " ")
-    return f"It is in {'one of the ' + name + 's' if several else 'the ' + name}.", {
-        p for p, k in kind_of.items() if k == kind
-    }
+    text = f"It is in {'one of the ' + name + 's' if several else 'the ' + name}{floor}."
+    return text, {p for p, r in room_of.items() if r.id in same}
 
 
 def _which(s: Situation) -> tuple[str, set[str]]:

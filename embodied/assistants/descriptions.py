@@ -229,5 +229,6 @@ def features_in_words(description: Description, turn: int) -> str:
             parts.append("you are there")
         else:
             where = side((f.horizontal - turn) * STEP)
-            parts.append(f"go {where}" if f.kind == "action" else f"{f.name} ({where}, {f.distance} m)")
+            steep = (" down", "", " up")[f.vertical + 1]
+            parts.append(f"go{steep} {where}" if f.kind == "action" else f"{f.name} ({where}, {f.distance} m)")
     return ", ".join(parts)

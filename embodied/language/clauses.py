@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 LEFT, RIGHT = "left", "right"
+UP, DOWN = "up", "down"
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,16 @@ class OpenDoor(OfRoom):
     """LEFT or RIGHT of the way walked, where one turns to it."""
 
 
+@dataclass(frozen=True)
+class Climb:
+    """Walk along the stairs to the next floor."""
+
+    way: str
+    """UP or DOWN."""
+    half: bool = False
+    """Only to where the stairs turn."""
+
+
 class Cross(OfRoom):
     """Walk on through the room one is in."""
 
@@ -112,9 +123,8 @@ class StopHere:
     """The end is where the last clause ended."""
 
 
-Clause = (
-    Turn | Exit | Enter | OpenDoor | Cross | Forward | Metres | To | Past | Avoid | Notice | StopBy | StopIn | StopHere
-)
+Walking = Turn | Exit | Enter | OpenDoor | Climb | Cross | Forward | Metres | To | Past
+Clause = Walking | Avoid | Notice | StopBy | StopIn | StopHere
 STOPS = (StopBy, StopIn, StopHere)
 REMARKS = (Avoid, Notice)
 """Clauses that ask for nothing to be done."""

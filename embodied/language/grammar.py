@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 import numpy as np
 
 from embodied.language.clauses import (
+    DOWN,
     LEFT,
+    UP,
     Clause,
+    Climb,
     Cross,
     Enter,
     Exit,
@@ -53,6 +56,8 @@ def kind_of(clause: Clause) -> str:
         return "door" if clause.nth else "enter"
     if isinstance(clause, OpenDoor) and clause.side:
         return "open_door_side"
+    if isinstance(clause, Climb):
+        return "climb_half" if clause.half else "climb"
     return _NAMES[type(clause)]
 
 
@@ -143,6 +148,8 @@ def _fill(
             slots |= {"metres": f"{spelt} meter{many}", "steps": f"{spelt} big step{many}"}
         if isinstance(p.clause, Enter) and p.clause.nth:
             slots["nth"] = SPOKEN.ordinals[p.clause.nth]
+        if isinstance(p.clause, Climb):
+            slots |= {"way": p.clause.way, "upstairs": f"{p.clause.way}stairs"}
         if (side := side_of(p.clause)) is not None:
             slots["side"] = side
         if p.word is not None:
@@ -195,7 +202,21 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
 
 
 ARRIVING = frozenset(
-    {"exit", "enter", "door", "open_door", "open_door_side", "cross", "forward", "metres", "to", "past", "past_side"}
+    [
+        "exit",
+        "enter",
+        "door",
+        "open_door",
+        "open_door_side",
+        "climb",
+        "climb_half",
+        "cross",
+        "forward",
+        "metres",
+        "to",
+        "past",
+        "past_side",
+    ]
 )
 """Clauses that lead somewhere, so that 'once there' may follow."""
 _SUBJECTS = re.compile(r"(you|you'll|your|that|that's|this|if|I|the|not|bingo|done|end)\b")
@@ -315,6 +336,8 @@ def _patterns() -> tuple[_Pattern, ...]:
         "metres": rf"(?P<n>\d+|{_any(SPOKEN.numbers)}) meters?",
         "steps": rf"(?P<n>\d+|{_any(SPOKEN.numbers)}) big steps?",
         "nth": f"(?P<nth>{_any(SPOKEN.ordinals)})",
+        "way": f"(?P<way>{UP}|{DOWN})",
+        "upstairs": f"(?P<way>{UP}|{DOWN})stairs",
         "walk": f"(?:{_any(SPOKEN.verbs + SPOKEN.playful)})",
         "soon": f"(?:{_any(SPOKEN.soon)})",
     }
@@ -355,6 +378,8 @@ def _made(name: str, slots: Mapping[str, str], rooms: Iterator[str], thing: Refe
     if name == "metres":
         n = slots["n"]
         return Metres(SPOKEN.numbers.index(n) if n in SPOKEN.numbers else int(n))
+    if name in ("climb", "climb_half"):
+        return Climb(slots["way"], name == "climb_half")
     if name == "past_side":
         return Past(cast(Referent, thing), slots["side"])
     made: Any = next(c for c, known in _NAMES.items() if known == name)

@@ -21,6 +21,7 @@ from embodied.language.clauses import (
     REMARKS,
     STOPS,
     Clause,
+    Climb,
     Cross,
     Enter,
     Exit,
@@ -45,7 +46,7 @@ MOST_WALKS = 2500
 ARRIVAL_DISTANCE, PASSING_DISTANCE = 1.6, 2.6
 """Metres within which one is at a thing, or passes it."""
 UNASKED = 1.0
-"""Cost of opening a door that nobody spoke of."""
+"""Cost of opening a door, or of a step on stairs, that nobody spoke of."""
 MISSING = 4.0
 """Cost of a thing or room that is not there."""
 
@@ -145,7 +146,11 @@ def _onward(eyes: Lookout, clause: Clause, walk: _Walk) -> Iterator[tuple[float,
     if steps < STEPS_PER_CLAUSE:
         for way in eyes.at(path[-1]).ways:
             added = _step_cost(clause, way, walk) + 1.5 * (way.node in path)
-            if way.leaves and not isinstance(clause, Exit | Enter | OpenDoor):
+            if isinstance(clause, Climb):
+                added = 0.12 + (0.0 if steps else added) + MISSING * (way.climb not in (None, clause.way))
+            elif way.climb is not None:
+                added += UNASKED
+            if way.leaves and not isinstance(clause, Exit | Enter | OpenDoor | Climb):
                 added += 0.4 * (not isinstance(clause, Cross))
             if way.closed and not isinstance(clause, OpenDoor):
                 added += UNASKED
@@ -186,6 +191,9 @@ def walk_cost(clause: Clause, eyes: Lookout, path: Sequence[int]) -> float:
     if isinstance(clause, OpenDoor):
         opened = [_way(eyes.at(a), b).closed for a, b in itertools.pairwise(path)]
         return MISSING * (last.kind != clause.kind) + MISSING * (opened[-1:] != [True]) + 0.8 * (sum(crossings) > 1)
+    if isinstance(clause, Climb):
+        climbed = any(_way(eyes.at(a), b).climb == clause.way for a, b in itertools.pairwise(path))
+        return MISSING * (not climbed) + MISSING * (last.on_stairs != clause.half)
     if isinstance(clause, Cross):
         kinds = [eyes.at(n).kind for n in path]
         return 1.5 * (clause.kind not in kinds) + 0.7 * sum(k != clause.kind for k in kinds[1:])

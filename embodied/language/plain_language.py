@@ -10,7 +10,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from embodied.geometry import wrap
+from embodied.house.house import House
 from embodied.interface import FindObject, Place
+
+LEVEL = 0.1
+"""Metres up or down from which a step is one on stairs."""
+
+
+def floors_away(house: House, here: str, there: str) -> str:
+    """' upstairs', ' two floors down', ' on this floor' of one room seen from another; '' in houses of one storey."""
+    apart = house.room_by_id[there].storey - house.room_by_id[here].storey
+    if len(house.storeys) == 1 or not apart:
+        return " on this floor" * (len(house.storeys) > 1)
+    way = "up" if apart > 0 else "down"
+    return f" {way}stairs" if abs(apart) == 1 else f" two floors {way}"
 
 
 class PlainLanguage:
@@ -35,6 +48,8 @@ class PlainLanguage:
                 if world.graph.barred(a, b, world.graph.closed):
                     words += " . open the door and go"
                 words += f" into the {kind.replace('_', ' ')}"
+            if abs(offset[2]) > LEVEL:
+                words += f" {'up' if offset[2] > 0 else 'down'} the stairs"
             parts.append(words)
             yaw = direction
         return " . ".join([*parts, "stop"]) + " ."

@@ -12,10 +12,13 @@ import numpy as np
 from embodied.geometry import wrap
 from embodied.interface import SeenPlace
 from embodied.language.clauses import (
+    DOWN,
     LEFT,
     RIGHT,
     STOPS,
+    UP,
     Avoid,
+    Climb,
     Cross,
     Enter,
     Exit,
@@ -34,7 +37,7 @@ from embodied.language.clauses import (
 from embodied.language.grammar import Phrase
 from embodied.language.lexicon import PASSAGES, Lexicon, Word, lexicon_of, says
 from embodied.language.listener import ARRIVAL_DISTANCE, PASSING_DISTANCE
-from embodied.language.surroundings import Lookout, Surroundings, VisibleThing, doorway
+from embodied.language.surroundings import Lookout, Surroundings, VisibleThing, doorway, is_on_stairs
 from embodied.language.templates import SPOKEN, Speaker
 
 SLIGHT, SHARP, BACK = math.radians(38), math.radians(66), math.radians(140)
@@ -50,17 +53,30 @@ class Leg:
     """Radians turned before it, left positive."""
     crosses: bool
     """Its last step leads into another room."""
+    climb: str | None = None
+    """UP or DOWN along stairs."""
 
 
 def legs_of(world: SeenPlace, path: Sequence[int], yaw: float) -> list[Leg]:
-    """The path cut at turns and at doorways."""
+    """The path cut at turns, at doorways, and where it comes to stairs and leaves them."""
     rooms, positions = world.graph.room_of_node, np.asarray(world.graph.positions)
     legs: list[Leg] = []
     nodes: list[int] = []
-    facing, turned = yaw, 0.0
+    facing, turned, stairs = yaw, 0.0, 0.0
     for a, b in itertools.pairwise(path):
         step = positions[b] - positions[a]
         direction = math.atan2(step[1], step[0])
+        if is_on_stairs(world, a) or is_on_stairs(world, b):
+            if not stairs and nodes:
+                legs.append(Leg(tuple(nodes), turned, False))
+            if not stairs:
+                nodes, turned = [a], float(wrap(direction - facing))
+            nodes.append(b)
+            stairs, facing = stairs + float(step[2]), direction
+            if not is_on_stairs(world, b) or b == path[-1]:
+                legs.append(Leg(tuple(nodes), turned, False, UP if stairs > 0 else DOWN))
+                nodes, stairs = [], 0.0
+            continue
         turn = float(wrap(direction - facing))
         if nodes and abs(turn) >= SLIGHT:
             legs.append(Leg(tuple(nodes), turned, False))
@@ -120,6 +136,8 @@ def plan(
                     phrases.pop()
                 crossing = counted
             phrases += crossing
+        elif leg.climb is not None:
+            phrases.append(Phrase(Climb(leg.climb, is_on_stairs(world, leg.nodes[-1]))))
         else:
             phrases.append(_within_a_room(telling, leg, last=n + 1 == len(legs)))
     if telling.chance(speaker.remarks) and (remark := _remark(telling, path)) is not None:

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from embodied.interface import SeenPlace
-from embodied.language.clauses import LEFT, RIGHT, Referent
+from embodied.language.clauses import DOWN, LEFT, RIGHT, UP, Referent
 from embodied.language.lexicon import UNFIT, says
+from embodied.language.plain_language import LEVEL
+from embodied.navigation.free_space import EYE
 
 if TYPE_CHECKING:
     from embodied.assets.records import Asset
@@ -52,6 +54,8 @@ class Way:
     """The doorway it goes through; tells two apart."""
     closed: bool = False
     """A closed door bars it."""
+    climb: str | None = None
+    """UP or DOWN along stairs."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,7 @@ class Surroundings:
     things: tuple[VisibleThing, ...]
     ways: tuple[Way, ...]
     doors: tuple[Door, ...] = ()
+    on_stairs: bool = False
 
     def nearest(self, thing: Referent) -> VisibleThing | None:
         """The nearest thing in view that `thing` may mean."""
@@ -124,10 +129,17 @@ def look(world: SeenPlace, node: int) -> Surroundings:
                 leaves=other != room,
                 door=min(between)[1] if between else None,
                 closed=bool(graph.barred(node, n, graph.closed)),
+                climb=(UP if step[2] > 0 else DOWN) if abs(step[2]) > LEVEL else None,
             )
         )
     seen_doors = tuple(Door(name, (float(at[0] - here[0]), float(at[1] - here[1]))) for name, _, at in doors)
-    return Surroundings(house.room_by_id[room].kind, things, tuple(ways), seen_doors)
+    return Surroundings(house.room_by_id[room].kind, things, tuple(ways), seen_doors, is_on_stairs(world, node))
+
+
+def is_on_stairs(world: SeenPlace, node: int) -> bool:
+    """True if a node lies between two floors."""
+    floor = world.graph.positions[node][2] - EYE
+    return bool(world.house.stairs) and min(abs(floor - s.elevation) for s in world.house.storeys) > LEVEL
 
 
 def _doors(world: SeenPlace, room: str) -> list[tuple[str, str, np.ndarray]]:
