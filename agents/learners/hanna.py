@@ -45,7 +45,7 @@ class HannaStudyOptions(EpisodeStudyOptions, Encoded, WithDevice):
     """Agents that ask people for help and follow their routes."""
 
     tables: Tables
-    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.2 or words."""
+    """Make these tables: 4.3, 4.4, 4.5, 4.6 or D.2."""
     seeds: Seeds = 1
     config: Annotated[TrainingConfig, Settings(TRAINING, HANNA_SCALES, skip=("training_houses",))]
     evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]

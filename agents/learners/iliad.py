@@ -51,7 +51,7 @@ class NavTraining(IliadTraining, Nav):
 @dataclass(frozen=True, kw_only=True)
 class IliadStudyOptions(StudyOptions, Repeated, ScaledDown):
     tables: Tables
-    """Make these tables: 3.4, 3.5, C.1, 'figure 3.7' or algorithms; in NAV also words."""
+    """Make these tables: 3.4, 3.5, C.1, 'figure 3.7' or algorithms."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -40,7 +40,7 @@ class VlnStudyOptions(EpisodeStudyOptions, Encoded):
     """Agents that follow route instructions."""
 
     tables: Tables
-    """Make these tables: followers or words."""
+    """Make this table: followers."""
     others: Count = 1
     """Training seeds of all rows but the first."""
     config: Annotated[FollowerSettings, Settings(TRAINING, VLN_SCALES, skip=("forcing", "blind", "wordless"))]

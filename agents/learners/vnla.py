@@ -50,7 +50,7 @@ class VnlaStudyOptions(EpisodeStudyOptions, Encoded):
     """Agents that ask an advisor within a budget."""
 
     tables: Tables
-    """Make these tables: askers, interventions, algorithm-6, rules or words."""
+    """Make these tables: askers, interventions, algorithm-6 or rules."""
     others: Count | None = None
     """Training seeds of all rows but the learned asker's (default: --seeds)."""
     config: Annotated[VnlaSettings, Settings(TRAINING, VNLA_SCALES, skip=("asker", "ask_rules", "rules"))]
