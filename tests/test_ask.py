@@ -18,7 +18,7 @@ from embodied.agents.ask.config import AskerConfig, AskEvaluation
 from embodied.agents.ask.foresight import CHOICES, Foresight
 from embodied.agents.ask.learned import LearnedAsker, facts, fit
 from embodied.agents.ask.study import AskStudy
-from embodied.agents.language_models.assistant import QUESTION_WORDS
+from embodied.agents.language_models.agent import QUESTION_WORDS
 from embodied.agents.studies.engine import run_study
 from embodied.assistants.ask import in_view
 from embodied.cli import main as start

@@ -9,8 +9,7 @@ import pytest
 import sacrebleu
 import torch
 
-from embodied.agents.bandit.bleu import corpus_bleu, sentence_bleu
-from embodied.agents.bandit.ratings import Rater, deviation, granular, skewed
+from embodied.agents.bandit.ratings import Rater, corpus_bleu, deviation, granular, sentence_bleu, skewed
 from embodied.agents.common.losses import Decisions, actor_loss, advantages, critic_loss
 from embodied.agents.common.session import DivergedError, descend
 from embodied.seeds import stream

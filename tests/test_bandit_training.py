@@ -19,13 +19,17 @@ from embodied.agents.bandit.network import (
     Critic,
     EncoderDecoder,
     Translator,
+    batches,
     begin,
+    decode,
+    greedy,
     load_network,
+    padded,
+    perplexity,
 )
 from embodied.agents.bandit.ratings import Rater
 from embodied.agents.bandit.study import BanditStudy
 from embodied.agents.bandit.training import bandit, load_corpus, pretrain, train_critic
-from embodied.agents.bandit.translate import batches, decode, greedy, padded, perplexity
 from embodied.agents.common.checkpoint import read_checkpoint
 from embodied.agents.common.choosing import sampled_choice
 from embodied.agents.common.session import Session

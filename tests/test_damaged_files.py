@@ -34,13 +34,12 @@ from PIL import Image
 from embodied.agents.bandit.network import TRANSLATOR_REMEDY, BanditAbout
 from embodied.agents.common.checkpoint import restore
 from embodied.agents.common.session import Session
-from embodied.agents.common.tensor_file import save_tensors
 from embodied.agents.common.vocabulary import build_vocabulary
-from embodied.agents.common.weights import WEIGHTS_FORMAT, load_weights
+from embodied.agents.common.weights import WEIGHTS_FORMAT, load_weights, save_tensors
 from embodied.agents.hanna.agent import HannaAbout, HannaAgent
 from embodied.agents.hanna.training_config import HANNA_SCALES
 from embodied.agents.hari import agent as hari
-from embodied.agents.iliad.nav.stages import load_follower
+from embodied.agents.iliad.nav.run import load_follower
 from embodied.agents.iliad.regex.run import load_student
 from embodied.agents.vision.config import PLAIN
 from embodied.agents.vision.features import load_features, save_features

@@ -30,7 +30,7 @@ def source(data, tmp_path, monkeypatch):
         for seed, kind in enumerate(("fast", "unlit")):
             file = tmp_path / "strips" / drawing(RENDER_PRESETS[kind]) / f"{name}.npz"
             coloured_strips(name, nodes, seed=5 * seed).save(file)
-    monkeypatch.setattr("embodied.agents.vision.compact.STAGE_WIDTHS", (8, 8, 16, 16))
+    monkeypatch.setattr("embodied.agents.vision.lite.STAGE_WIDTHS", (8, 8, 16, 16))
     return StripSource(data.folder, tmp_path / "strips", tmp_path / "cache", "unlit")
 
 

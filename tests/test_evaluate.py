@@ -139,7 +139,7 @@ def test_agents_whose_folders_end_alike_have_rows_of_their_own():
 def test_what_the_listener_makes_of_routes_is_told_for_every_split(tmp_path, capsys, monkeypatch):
     data, counts = built(tmp_path / "d", make_house=small_house), iter([(1, 2), (3, 4)])
     monkeypatch.setattr(Dataset, "open_world", lambda self, name, *_: self.place(name))
-    monkeypatch.setattr("embodied.agents.language_models.routes.followed_replies", lambda *_: next(counts))
+    monkeypatch.setattr("embodied.agents.language_models.agent.followed_replies", lambda *_: next(counts))
     order = ["evaluate", "hanna", "--data", str(data.folder), "--agent", "no ask", "--assistant", "hand_chat:Parrot"]
     assert main([*order, "--split", "val_unseen", "test_unseen", "--tasks", "2", "--json"]) == 0
     listener = json.loads(capsys.readouterr().out)["listener"]

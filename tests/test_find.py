@@ -9,13 +9,12 @@ import pytest
 import torch
 from hand_worlds import grid_world, line_world
 
-from embodied.agents.common.playing import Supervised
+from embodied.agents.common.imitation import Supervised
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.find.config import FinderConfig
 from embodied.agents.find.network import AROUND, READ, Explorer, SeekNetwork
-from embodied.agents.find.policy import STOP, WORDS, Search, costs_of
+from embodied.agents.find.policy import STOP, WORDS, Search, WayMap, costs_of
 from embodied.agents.find.run import Finder, FinderAbout, FindLearner, Labels, new_finder, tasks_in
-from embodied.agents.find.way_map import WayMap
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.training_data import Split
 from embodied.evaluation.evaluate import play

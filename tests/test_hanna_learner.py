@@ -20,7 +20,7 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
 from embodied.agents.common.checkpoint import CheckpointError, restore
 from embodied.agents.common.choosing import choose_at, choose_greedily, choose_sampled
-from embodied.agents.common.playing import play_with_memory
+from embodied.agents.common.imitation import play_with_memory
 from embodied.agents.common.session import (
     DivergedError,
     Session,
@@ -31,8 +31,10 @@ from embodied.agents.common.session import (
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
 from embodied.agents.hanna.agent import HannaAbout, HannaAgent
 from embodied.agents.hanna.asking import RULES, ask_above
-from embodied.agents.hanna.losses import (
+from embodied.agents.hanna.policy import for_training
+from embodied.agents.hanna.run import (
     IGNORE,
+    HannaLearner,
     curiosity,
     help_loss,
     imitation_loss,
@@ -41,8 +43,6 @@ from embodied.agents.hanna.losses import (
     negative_log_likelihood,
     reason_loss,
 )
-from embodied.agents.hanna.policy import for_training
-from embodied.agents.hanna.run import HannaLearner
 from embodied.agents.hanna.training_config import EVALUATIONS, HANNA_SCALES, TrainingConfig
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.training_data import Split

@@ -13,17 +13,16 @@ from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common.checkpoint import CheckpointError
+from embodied.agents.common.imitation import TaskSet
 from embodied.agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
-from embodied.agents.common.playing import TaskSet
 from embodied.agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
-from embodied.agents.hari.intention import IntentionRun, counts_of, train, train_step, values
 from embodied.agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
 from embodied.agents.hari.policy import DO, DONE, Choice, Considered, HariPolicy, Reader, carry, consider, policy_of
 from embodied.agents.hari.pretraining import PretrainingData, guided_share, pretrain, pretraining_success
 from embodied.agents.hari.pretraining import train_step as lesson
 from embodied.agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
-from embodied.agents.hari.run import TEST
+from embodied.agents.hari.run import TEST, IntentionRun, counts_of, train, train_step, values
 from embodied.agents.hari.study import HariStudy
 from embodied.agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, percept
 from embodied.agents.studies.engine import run_study

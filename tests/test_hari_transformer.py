@@ -1,10 +1,10 @@
-"""embodied.agents.hari.transformer: the same network as torch's, over packed rows."""
+"""embodied.agents.hari.networks: the same network as torch's, over packed rows."""
 
 import pytest
 import torch
 from torch import nn
 
-from embodied.agents.hari.transformer import Packing, Transformer, fast_dropout
+from embodied.agents.hari.networks import Packing, Transformer, fast_dropout
 
 
 @pytest.fixture

@@ -10,12 +10,17 @@ from hand_worlds import grid_world, line_world
 from embodied.agents.common.choosing import greedy_choice
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.hanna.inputs import orientation
-from embodied.agents.iliad.config import LearnerConfig
-from embodied.agents.iliad.nav.config import NavConfig
-from embodied.agents.iliad.nav.network import WalkDescriber
-from embodied.agents.iliad.nav.stages import new_follower
+from embodied.agents.iliad.config import LearnerConfig, NavConfig
+from embodied.agents.iliad.nav.run import new_follower
 from embodied.agents.iliad.nav.student import LoopFree, NavEyes, NavStudent, Track
-from embodied.agents.iliad.nav.teacher import GrammarNavTeacher, LearnedNavTeacher, arrives, encoded_walks, texts_of
+from embodied.agents.iliad.nav.teacher import (
+    GrammarNavTeacher,
+    LearnedNavTeacher,
+    WalkDescriber,
+    arrives,
+    encoded_walks,
+    texts_of,
+)
 from embodied.agents.iliad.nav.world import (
     HORIZON,
     NavMarginal,

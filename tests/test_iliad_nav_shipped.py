@@ -9,7 +9,7 @@ from hand_worlds import grid_world
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_WALKER
 from embodied.agents.common.vocabulary import build_vocabulary
-from embodied.agents.iliad.nav.stages import load_follower
+from embodied.agents.iliad.nav.run import load_follower
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent
 from embodied.agents.iliad.nav.world import MOVES, Trip, walk_along
 from embodied.agents.vision.bank import FeatureBank

@@ -12,12 +12,18 @@ from hypothesis import strategies as st
 
 from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.choosing import greedy_choice
-from embodied.agents.iliad.config import LearnerConfig
-from embodied.agents.iliad.regex.coding import PAD, changes, characters, request_words, texts
-from embodied.agents.iliad.regex.config import RegexConfig
-from embodied.agents.iliad.regex.data import LEAST_CHANGED, WordTask, make_data, rules_without_requests
+from embodied.agents.iliad.config import LearnerConfig, RegexConfig
+from embodied.agents.iliad.regex.data import LEAST_CHANGED, WordTask, made_up, make_data, rules_without_requests
 from embodied.agents.iliad.regex.language import PARTS, templates
-from embodied.agents.iliad.regex.networks import ChangeDescriber, Speller
+from embodied.agents.iliad.regex.networks import (
+    PAD,
+    ChangeDescriber,
+    Speller,
+    changes,
+    characters,
+    request_words,
+    texts,
+)
 from embodied.agents.iliad.regex.rules import (
     ALPHABET,
     LETTERS,
@@ -30,10 +36,8 @@ from embodied.agents.iliad.regex.rules import (
     outputs,
     random_rule,
 )
-from embodied.agents.iliad.regex.run import RegexSetup, load_student
-from embodied.agents.iliad.regex.stages import new_network
+from embodied.agents.iliad.regex.run import RegexSetup, load_student, new_network
 from embodied.agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher, parse
-from embodied.agents.iliad.regex.words import made_up
 from embodied.agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Written, carried_out, nearness
 from embodied.agents.iliad.study import IliadStudy
 from embodied.agents.iliad.training import IliadProblem, train

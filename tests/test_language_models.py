@@ -15,13 +15,17 @@ from hand_chat import ChatServer, Parrot, said
 from hand_worlds import HandWorld, grid_world
 from PIL import Image
 
-from embodied.agents.language_models.agent import LanguageModelAgent
-from embodied.agents.language_models.assistant import ModelAssistant, PersonAssistant, assistant_maker
+from embodied.agents.language_models.agent import (
+    LanguageModelAgent,
+    ModelAssistant,
+    PersonAssistant,
+    assistant_maker,
+    followed_replies,
+    listener_arrives,
+)
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
 from embodied.agents.language_models.completions import object_schema
-from embodied.agents.language_models.observations import oracle_names
-from embodied.agents.language_models.prompts import PromptBuilder, read_prompt
-from embodied.agents.language_models.routes import followed_replies, listener_arrives
+from embodied.agents.language_models.prompts import PromptBuilder, oracle_names, read_prompt
 from embodied.agents.language_models.transport import MOST_BYTES, completions_url, proxy_of
 from embodied.assets.catalogue import load_catalogue
 from embodied.assistants.ask import AskAssistant

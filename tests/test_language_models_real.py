@@ -13,8 +13,7 @@ from hand_worlds import grid_world
 
 pytest.importorskip("llama_cpp", reason="the optional extra [smollm] is not installed")
 
-from embodied.agents.language_models.agent import LanguageModelAgent
-from embodied.agents.language_models.assistant import ModelAssistant
+from embodied.agents.language_models.agent import LanguageModelAgent, ModelAssistant
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
 from embodied.cli.llm import SMOLLM, serving
 from embodied.evaluation.evaluate import play

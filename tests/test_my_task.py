@@ -17,7 +17,7 @@ from gymnasium.utils.env_checker import check_env
 from hand_data import drawn_house, hand_house, paint
 from hand_worlds import grid_world
 
-from embodied.agents.language_models.observations import observation_in_words
+from embodied.agents.language_models.prompts import observation_in_words
 from embodied.agents.studies.engine import run_study
 from embodied.agents.studies.episodes import EpisodeStudy
 from embodied.agents.studies.tables import StudyRow, StudyTable

@@ -13,7 +13,7 @@ from hand_vnla import TINY as VNLA
 from hand_vnla import lesson
 from test_hanna_learner import agent_for, setting
 
-from embodied.agents.hanna.evaluation import hanna_policies
+from embodied.agents.hanna.agent import hanna_policies
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.training_data import Split
 from embodied.evaluation.evaluate import play
@@ -22,7 +22,7 @@ from embodied.kinds import metrics
 
 ROOT = Path(__file__).resolve().parent.parent
 SEEING = {
-    "agents/language_models/observations.py",
+    "agents/language_models/prompts.py",
     "agents/vision/bank.py",
     "agents/vision/live.py",
     "embodied/policies/doors.py",

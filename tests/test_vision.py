@@ -14,14 +14,14 @@ from hand_data import random_encoder
 from hand_pixels import coloured_strips
 
 from embodied.agents.common.checkpoint import CheckpointError
-from embodied.agents.common.tensor_file import read_weights, save_tensors
+from embodied.agents.common.weights import read_weights, save_tensors
 from embodied.agents.vision import labels, strip
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.config import PLAIN, RENDER_PRESETS, VisionConfig, drawing
+from embodied.agents.vision.detector import LabelledFeatures, average_precision, read
 from embodied.agents.vision.encoder import load_encoder, pool_views, save_encoder, strip_map, whitening
 from embodied.agents.vision.features import feature_path, load_features, save_features
 from embodied.agents.vision.lite import Lite, folded, load_imagenet
-from embodied.agents.vision.probe import LabelledFeatures, average_precision, read
 from embodied.agents.vision.training import train_encoder
 from embodied.errors import UnableError
 from embodied.interface import Sight
@@ -182,7 +182,7 @@ def test_training_the_encoder_lowers_its_loss(tmp_path):
     lines = []
     config = VisionConfig(epochs=6, batch=2, least_views=1)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("embodied.agents.vision.compact.STAGE_WIDTHS", (8, 8, 16, 16))
+        patch.setattr("embodied.agents.vision.lite.STAGE_WIDTHS", (8, 8, 16, 16))
         houses = [coloured_strips("a", 8, seed=0)]
         encoder, classes = train_encoder(houses, config, tmp_path / "run", note=lines.append)
         assert classes == ["rose", "fern"]
@@ -197,7 +197,7 @@ def test_training_the_encoder_lowers_its_loss(tmp_path):
 
 @pytest.mark.slow
 def test_training_goes_on_after_the_epoch_it_was_stopped_in(tmp_path, monkeypatch):
-    monkeypatch.setattr("embodied.agents.vision.compact.STAGE_WIDTHS", (8, 8, 16, 16))
+    monkeypatch.setattr("embodied.agents.vision.lite.STAGE_WIDTHS", (8, 8, 16, 16))
     config = VisionConfig(epochs=3, batch=2, least_views=1)
     houses, folder = [coloured_strips(name, 4, seed=k) for k, name in enumerate("ab")], tmp_path / "run"
     whole, _ = train_encoder(houses, config, tmp_path / "whole", note=lambda line: None)

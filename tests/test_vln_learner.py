@@ -17,10 +17,9 @@ from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.training_data import Split
-from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.network import FollowerOutputs
-from embodied.agents.vln.policy import VlnMoment
+from embodied.agents.vln.policy import VlnAbout, VlnAgent, VlnMoment
 from embodied.agents.vln.run import VlnLearner, losses_of, teacher_share
 from embodied.assistants.route_system import build_routes
 from embodied.datasets.store import dataset_of

@@ -9,12 +9,17 @@ import pytest
 import torch
 from torch import nn
 
-from embodied.agents.common import word_vectors
-from embodied.agents.common.vocabulary import build_vocabulary
-from embodied.agents.common.word_vectors import PretrainedVocabulary, WordEmbedding, use_vectors, vocabulary_with
+from embodied.agents.common import vocabulary
+from embodied.agents.common.vocabulary import (
+    PretrainedVocabulary,
+    WordEmbedding,
+    build_vocabulary,
+    use_vectors,
+    vocabulary_with,
+)
 from embodied.agents.hanna.attention import TextEncoder
-from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings
+from embodied.agents.vln.policy import VlnAbout, VlnAgent
 from embodied.errors import UnableError
 
 WORDS = build_vocabulary(["walk to the hall, turn left", "stop near the bed"]).words
@@ -105,13 +110,13 @@ def test_hannas_and_navs_text_encoder_reads_new_words():
 def test_settings_name_the_vectors_there_are_and_a_missing_package_is_named(monkeypatch):
     with pytest.raises(ValueError, match="word_vectors must be one of .*'minilm'.* got 'glove'"):
         FollowerSettings(word_vectors="glove")
-    monkeypatch.setattr(word_vectors, "PACKAGE", "no_such_package")
+    monkeypatch.setattr(vocabulary, "PACKAGE", "no_such_package")
     with pytest.raises(UnableError, match="sentences"):
-        word_vectors.minilm.__wrapped__()
+        vocabulary.minilm.__wrapped__()
 
 
 def test_minilms_vectors_know_that_words_are_alike():
-    pytest.importorskip(word_vectors.PACKAGE)
-    vectors = word_vectors.minilm()(["sofa", "couch", "window"])
+    pytest.importorskip(vocabulary.PACKAGE)
+    vectors = vocabulary.minilm()(["sofa", "couch", "window"])
     couch, window = (float(vectors[0] @ v / np.linalg.norm(v)) for v in vectors[1:])
     assert couch > window

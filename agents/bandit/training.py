@@ -20,12 +20,23 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from embodied.agents.bandit.bleu import corpus_bleu, sentence_bleu
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import corpus_digest, load
-from embodied.agents.bandit.network import Critic, Translator, begin, load_network, save_network
-from embodied.agents.bandit.ratings import CLEAN, Rater
-from embodied.agents.bandit.translate import TokenizedCorpus, batches, decode, greedy, padded, perplexity, tokenized
+from embodied.agents.bandit.network import (
+    Critic,
+    TokenizedCorpus,
+    Translator,
+    batches,
+    begin,
+    decode,
+    greedy,
+    load_network,
+    padded,
+    perplexity,
+    save_network,
+    tokenized,
+)
+from embodied.agents.bandit.ratings import CLEAN, Rater, corpus_bleu, sentence_bleu
 from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.choosing import sampled_choice
 from embodied.agents.common.losses import Decisions, actor_loss, critic_loss

@@ -3,19 +3,21 @@
 for update in session:
     learner.learn(update)           # play tasks, have them labelled, take a gradient step
     every so often: validate        # as in evaluation; keep the agent if it is as good as the best
+
+Training episodes are played by a policy that is shown the situations, and whose last memory, which holds all outputs,
+is wanted.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Unpack
 
 import torch
 from torch import Tensor
 
-from embodied.agents.common.playing import TaskSet, play_with_memory
 from embodied.agents.common.session import (
     Options,
     Progress,
@@ -28,11 +30,62 @@ from embodied.agents.common.session import (
     tasks_of_update,
 )
 from embodied.agents.common.settings import MAY_CHANGE
+from embodied.envs.base import HelpEnv
 from embodied.errors import UnableError
-from embodied.evaluation.evaluate import play
-from embodied.interface import Agent, Ask, Episode, Place, Task
+from embodied.evaluation.rollout import play, rollout
+from embodied.identity import Identity
+from embodied.interface import Actions, Agent, Ask, Episode, Observations, Place, Rngs, Situations, Task, act
 from embodied.kinds import metrics
 from embodied.records import Identity
+
+
+@dataclass(frozen=True, eq=False)
+class Supervised:
+    """A policy while a teacher watches: its `play` is given the situations."""
+
+    policy: Any
+    how: Mapping[str, Any] = field(default_factory=dict)
+    """Further arguments of `play`."""
+
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
+    ) -> tuple[Actions, Any]:
+        """See embodied.interface.PrivilegedPolicy."""
+        return self.policy.play(observations, situations, memory, rngs=rngs, **self.how)
+
+
+class _MemoryKeeper:
+    """An agent that keeps the memory of its last call, because `rollout` does not hand it out."""
+
+    def __init__(self, agent: Agent) -> None:
+        self._agent = agent
+        self.memory: Any = None
+
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
+    ) -> tuple[Actions, Any]:
+        actions, self.memory = act(self._agent, observations, situations, memory, rngs=rngs)
+        return actions, self.memory
+
+
+@dataclass(frozen=True, eq=False)
+class TaskSet:
+    """Tasks of some houses and the environment they are played in."""
+
+    worlds: Mapping[str, Place]
+    tasks: Sequence[Task]
+    make_env: Callable[[], HelpEnv]
+
+
+def play_with_memory(
+    make_env: Callable[[], HelpEnv], agent: Agent, tasks: Sequence[Task], *, seed: int
+) -> tuple[tuple[Episode, ...], Any]:
+    """Play `tasks` side by side; their episodes and the agent's last memory."""
+    remembering = _MemoryKeeper(agent)
+    frames = rollout(make_env, remembering, tasks, seed=seed, batch=len(tasks))
+    done = {f.index: f.episode for f in frames if f.episode is not None}
+    return tuple(done[i] for i in range(len(tasks))), remembering.memory
+
 
 VALIDATION_BATCH = 32
 """Episodes evaluated in parallel; changes speed, not results."""

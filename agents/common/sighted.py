@@ -9,11 +9,9 @@ from typing import Any, ClassVar, Self
 from torch import nn
 
 from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
-from embodied.agents.common.tensor_file import load_into
-from embodied.agents.common.vocabulary import Vocabulary
-from embodied.agents.common.weights import half_precision, load_weights, save_weights, seeded
-from embodied.agents.common.word_vectors import use_vectors, vocabulary_with
-from embodied.records import Identity
+from embodied.agents.common.vocabulary import Vocabulary, use_vectors, vocabulary_with
+from embodied.agents.common.weights import half_precision, load_into, load_weights, save_weights, seeded
+from embodied.identity import Identity
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ import torch.nn.functional as F
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
 from embodied.agents.common.choosing import choose_sampled
-from embodied.agents.common.playing import Supervised, play_with_memory
+from embodied.agents.common.imitation import Supervised, play_with_memory
 from embodied.agents.common.session import (
     Note,
     descend,
@@ -25,9 +25,8 @@ from embodied.agents.common.session import (
 )
 from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.sighted import About, SightedAgent
-from embodied.agents.common.tensor_file import load_into
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
-from embodied.agents.common.weights import check_features, load_weights, save_weights, seeded
+from embodied.agents.common.weights import check_features, load_into, load_weights, save_weights, seeded
 from embodied.agents.find.config import THINGS, FinderConfig
 from embodied.agents.find.network import READ, Explorer, SeekNetwork
 from embodied.agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, imitation_loss

@@ -13,7 +13,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from embodied.agents.common.word_vectors import WordEmbedding
+from embodied.agents.common.vocabulary import WordEmbedding
 
 SIMILARITY_THRESHOLD = 0.9
 """A past situation counts as nearly identical above this cosine (Eq D.3)."""

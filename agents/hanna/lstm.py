@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from embodied.agents.common.rows import Rows
-from embodied.agents.common.word_vectors import WordEmbedding
+from embodied.agents.common.vocabulary import WordEmbedding
 from embodied.agents.hanna.attention import DotAttend
 from embodied.agents.hanna.inputs import SLOTS, VIEWS, Percept, action_size
 from embodied.agents.hanna.network import AgentNetwork

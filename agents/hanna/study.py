@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from embodied.agents.common.session import Note
-from embodied.agents.hanna.agent import HannaAgent
-from embodied.agents.hanna.evaluation import by_the_text, hanna_policies
+from embodied.agents.hanna.agent import HannaAgent, by_the_text, hanna_policies
 from embodied.agents.hanna.run import train_agent
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from embodied.agents.studies.episodes import JUDGES
@@ -123,7 +122,7 @@ class HannaStudy(SightedStudy):
 
     name, agent_kind = "hanna", HannaAgent
     makers = ("embodied.agents.hanna.run",)
-    judges = (*JUDGES, "embodied.agents.hanna.evaluation")
+    judges = (*JUDGES, "embodied.agents.hanna.agent")
 
     def tables(self) -> Mapping[str, StudyTable]:
         """Splits out of distribution come beside the test splits."""

@@ -9,8 +9,7 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from embodied.agents.common.tensor_file import load_into
-from embodied.agents.common.weights import load_weights, save_weights, seeded
+from embodied.agents.common.weights import load_into, load_weights, save_weights, seeded
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.networks import INTENTIONS, ExecutionNetwork, RecurrentHead
 from embodied.agents.hari.words import FeatureWords

@@ -12,12 +12,12 @@ from embodied.agents.common.session import Note
 from embodied.agents.common.weights import weights_digest
 from embodied.agents.hari.agent import HariAgent, load_agent, load_executor
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
-from embodied.agents.hari.intention import intention_of
 from embodied.agents.hari.networks import INTENTIONS
 from embodied.agents.hari.rules import GREEDY, RANDOM, policies
 from embodied.agents.hari.run import (
     TEST,
     VALIDATION_CONDITIONS,
+    intention_of,
     rules_of,
     train_execution,
     train_intention,

@@ -1,4 +1,6 @@
-"""The training loop of ILIAD, whatever the problem and the learner: resumable, validated, exact after a kill."""
+"""The training loops of ILIAD: of one network before a student learns, whatever the world, by maximum likelihood or
+imitation; and of a student, whatever the problem and the learner. Resumable, validated, exact after a kill, since
+batches are drawn by (seed, update)."""
 
 from __future__ import annotations
 
@@ -6,16 +8,84 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
+from torch import Tensor, nn
 
+from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate, tasks_of_update
+from embodied.agents.common.weights import load_into, origin_of, read_weights, save_weights
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
 from embodied.agents.iliad.learners import IliadLesson, RequestBatch, adel, dagger, reinforce
-from embodied.agents.iliad.protocol import DescribingTeacher, Marginal, RequestWorld, Student, Tasks
-from embodied.records import Identity
+from embodied.agents.iliad.protocol import DescribingTeacher, Marginal, RequestWorld, Student, Tasks, one_request
+from embodied.identity import Identity, differences, identity_of
 from embodied.seeds import stream
+
+COOLDOWN = 0.4
+"""Share of the updates, the last ones, over which the rate of these stages falls (docs/sources.md, S92)."""
+CLIP = 5.0
+REPORT = 250
+"""Updates between judgings."""
+Network = TypeVar("Network", bound=nn.Module)
+
+
+def teach(
+    network: Network,
+    name: str,
+    loss_of: Callable[[np.random.Generator], Tensor],
+    judge: Callable[[], Mapping[str, float]],
+    *,
+    world: str,
+    folder: Path,
+    updates: int,
+    rate: float,
+    seed: int,
+    about: object,
+    note: Note,
+    **depends: object,
+) -> Network:
+    """Train `network` or go on, unless NAME.safetensors in the folder is what would come of it.
+
+    Args:
+      world: 'regex' or 'nav'; draws are named by it.
+      rate: Adam's learning rate.
+      about: stands beside the weights (embodied.agents.common.weights).
+      depends: all that the network depends on besides name, updates and seed.
+    """
+    identity = identity_of(f"embodied.agents.iliad.{world}.run", stage=name, updates=updates, seed=seed, **depends)
+    path = folder / f"{name}.safetensors"
+    if path.exists() and not differences(origin_of(path) or {}, identity):
+        load_into(network, read_weights(path), path)
+        return network.eval()
+    optimizer = torch.optim.Adam(network.parameters(), rate, fused=True)
+    network.train()
+    parts: dict[str, Stateful] = {"network": network, "adam": optimizer}
+    with Session(folder / name, identity, parts, updates, checkpoint_minutes=2.0, every=REPORT, note=note) as session:
+        for update in session:
+            set_learning_rate(optimizer, rate, update, updates, COOLDOWN)
+            with seeded_dropout(seed, update):
+                loss = loss_of(stream(seed, world, name, update))
+            descend(loss, optimizer, f"{name}, update {update}", CLIP)
+            session.add({"loss": float(loss.detach()), "updates": 1.0})
+            if session.due(REPORT):
+                session.record({"loss": session.sums["loss"] / session.sums["updates"], **judge()})
+                session.sums = {}
+        if session.progress.update >= updates:
+            save_weights(path, world, network.state_dict(), about, identity)
+    return network.eval()
+
+
+def drawn(tasks: Tasks, count: int, rng: np.random.Generator) -> list[Any]:
+    """Random tasks."""
+    return [tasks[int(i)] for i in rng.integers(len(tasks), size=count)]
+
+
+def asked(tasks: Tasks, rng: np.random.Generator) -> list[str]:
+    """One request of each task."""
+    return [one_request(task, rng=rng) for task in tasks]
+
 
 BATCH = 256
 """Tasks that are validated side by side; no influence on results."""

@@ -67,8 +67,7 @@ def study(args: HannaStudyOptions) -> StudyLearner:
 
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """Tables 4.3 to 4.5."""
-    from embodied.agents.hanna.agent import HannaAgent
-    from embodied.agents.hanna.evaluation import WITHOUT_LEARNING, players
+    from embodied.agents.hanna.agent import WITHOUT_LEARNING, HannaAgent, players
     from embodied.agents.vision.training_data import evaluation_data
 
     source, agent = evaluation_data(data, how), HannaAgent.load(file)

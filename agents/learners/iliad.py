@@ -7,9 +7,15 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.agents.iliad.config import LearnerConfig
-from embodied.agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
-from embodied.agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
+from embodied.agents.iliad.config import (
+    LEARNER_SCALES,
+    NAV_LEARNER_SCALES,
+    NAV_SCALES,
+    REGEX_SCALES,
+    LearnerConfig,
+    NavConfig,
+    RegexConfig,
+)
 from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import Nav, Repeated, ScaledDown, StudyOptions, Tables, Threaded, Timed, study_of
 from embodied.options import InputFolder, OutputFolder, Settings

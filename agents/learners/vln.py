@@ -63,7 +63,7 @@ def study(args: VlnStudyOptions) -> StudyLearner:
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """The follower beside agents without learning."""
     from embodied.agents.vision.training_data import evaluation_data
-    from embodied.agents.vln.agent import VlnAgent
+    from embodied.agents.vln.policy import VlnAgent
     from embodied.kinds.task_kind import PLAIN_AGENTS
 
     source, agent = evaluation_data(data, how), VlnAgent.load(file)

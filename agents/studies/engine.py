@@ -25,8 +25,7 @@ from embodied.agents.common.checkpoint import read_checkpoint
 from embodied.agents.common.parallel import use_threads
 from embodied.agents.common.session import Note
 from embodied.agents.common.weights import weights_digest
-from embodied.agents.studies.pages import draw, page
-from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.agents.studies.tables import StudyRow, StudyTable, draw, page
 from embodied.assets.cache import digest, write_bytes, write_json
 from embodied.evaluation.tables import Samples, in_percent, interval, less
 from embodied.locks import locked

@@ -15,10 +15,8 @@ import torch
 from torch import Tensor
 
 from embodied.agents.common.shipped import SHIPPED_ENCODER
-from embodied.agents.common.tensor_file import load_into
-from embodied.agents.common.weights import load_weights, save_weights
-from embodied.agents.vision.compact import COMPACT, Compact
-from embodied.agents.vision.lite import LITE, Lite, folded
+from embodied.agents.common.weights import load_into, load_weights, save_weights
+from embodied.agents.vision.lite import COMPACT, LITE, Compact, Lite, folded
 from embodied.agents.vision.strip import CELL, HEIGHT, STRIP_COLUMNS, STRIP_ROWS, WIDTH, inside_windows, windows
 from embodied.records import Identity
 

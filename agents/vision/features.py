@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from embodied.agents.common.tensor_file import load_tensors, save_tensors
+from embodied.agents.common.weights import load_tensors, save_tensors
 from embodied.agents.vision.config import PLAIN, drawing
 from embodied.agents.vision.encoder import Encoder
 from embodied.agents.vision.strip import HEIGHT

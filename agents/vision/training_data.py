@@ -8,16 +8,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from embodied.agents.common.playing import TaskSet
+from embodied.agents.common.imitation import TaskSet
 from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
 from embodied.agents.common.sighted import About
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.learner import PlaySettings
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.capture import house_features
 from embodied.agents.vision.config import SAME_TIME
 from embodied.agents.vision.drawn import drawings_of, drawn_world, pictures_of
 from embodied.agents.vision.encoder import Encoder, load_encoder
+from embodied.agents.vision.extract import house_features
 from embodied.agents.vision.live import LiveFeatures
 from embodied.assets.cache import default_cache
 from embodied.datasets.store import Dataset

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 
 from embodied.agents.common.rows import Rows
-from embodied.agents.common.word_vectors import WordEmbedding
+from embodied.agents.common.vocabulary import WordEmbedding
 from embodied.agents.hanna.attention import DotAttend
 from embodied.agents.vln.config import FollowerSettings
 from embodied.assets.records import ROOM_KINDS

@@ -1,4 +1,4 @@
-"""VlnPolicy: the follower's network as a Policy of embodied.interface, batched over episodes."""
+"""VlnPolicy: the follower's network as a Policy of embodied.interface, batched over episodes; and VlnAgent, trained."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from embodied.agents.common.choosing import Chooser, choose_greedily
+from embodied.agents.common.choosing import Chooser, choose_at, choose_greedily
 from embodied.agents.common.losses import IGNORE
 from embodied.agents.common.rows import RunningRows, hidden_channels
+from embodied.agents.common.sighted import About, SightedAgent
 from embodied.agents.common.vocabulary import Vocabulary
+from embodied.agents.common.weights import check_features
 from embodied.agents.hanna.inputs import action_index, candidate_rows, orientation
 from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.network import COPIES, FollowerNetwork, FollowerOutputs, FollowerState, FollowerViews
 from embodied.assets.records import ROOM_KINDS
 from embodied.geometry import wrap
@@ -156,3 +159,31 @@ def _moment(outputs: FollowerOutputs, situations: Sequence[Situation]) -> VlnMom
         for k, node in enumerate((s.pose.node, *s.candidate_nodes)):
             rooms[row, k] = ROOM_KINDS.index(house.room_by_id[str(graph.room_of_node[node])].kind)
     return VlnMoment(outputs, torch.tensor(moves, device=device), torch.tensor(left, device=device), rooms.to(device))
+
+
+@dataclass(frozen=True, kw_only=True)
+class VlnAbout(About):
+    config: FollowerSettings
+
+
+@dataclass(frozen=True, eq=False)
+class VlnAgent(SightedAgent):
+    about: VlnAbout
+    network: FollowerNetwork
+    kind, about_kind = "vln", VlnAbout
+
+    @staticmethod
+    def network_of(about: VlnAbout) -> FollowerNetwork:
+        return FollowerNetwork(about.config, len(about.words), about.feature_size)
+
+    def policy(self, bank: FeatureBank) -> VlnPolicy:
+        check_features(bank.digest, self.about.encoder)
+        config = self.about.config
+        return VlnPolicy(
+            self.network,
+            self.vocabulary,
+            bank.blind() if config.blind else bank,
+            choose=choose_at(self.about.evaluation.evaluation_temperature),
+            instruction_length=config.instruction_length,
+            wordless=config.wordless,
+        )

@@ -19,19 +19,24 @@ from torch import Tensor
 from embodied.agents.common import imitation
 from embodied.agents.common.choosing import choose_sampled
 from embodied.agents.common.losses import IGNORE, negative_log_likelihood
-from embodied.agents.common.more_paths import more_routes
-from embodied.agents.common.playing import Supervised
 from embodied.agents.common.session import Progress
 from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.training_data import Split, TrainingData
-from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings
-from embodied.agents.vln.policy import VlnMoment
-from embodied.interface import Agent, Episode, Task
-from embodied.kinds.shipped.vln import vln_task
-from embodied.records import identity_of
+from embodied.agents.vln.policy import VlnAbout, VlnAgent, VlnMoment
+from embodied.assets.cache import digest
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.closure import code_digest
+from embodied.assistants.route_system import sampled_paths, worded
+from embodied.datasets.store import Dataset
+from embodied.identity import identity_of
+from embodied.interface import Agent, Episode, Route, Task
+from embodied.language import People
+from embodied.records import load_lines, save_lines
+from embodied.seeds import stream
+from embodied.tasks.vln import vln_task
 
 LONGEST_EPISODE = 12
 """Steps of an episode of training: described paths have at most six, and who is lost learns little more."""
@@ -48,7 +53,7 @@ class VlnLearner(imitation.ImitationLearner):
     def player(self, update: int, bank: FeatureBank) -> Agent:
         dropout, share = self.config.environment_dropout, teacher_share(self.config, update)
         policy = dataclasses.replace(self.agent.policy(bank), choose=choose_sampled, environment_dropout=dropout)
-        return Supervised(policy, {"guided": lambda _, rng: bool(rng.random() < share)})
+        return imitation.Supervised(policy, {"guided": lambda _, rng: bool(rng.random() < share)})
 
     def loss_of(self, episodes: Sequence[Episode], experience: Sequence[VlnMoment]) -> imitation.BatchLoss:
         c = self.config
@@ -110,3 +115,18 @@ def more_tasks(source: TrainingData, training: Split, config: FollowerSettings) 
     more = lambda name: more_routes(source.data, name, config.more_paths, seed=0, cache=source.cache)
     routes = {name: more(name) for name in training.worlds}
     return [vln_task(name, route) for name, many in routes.items() for route in many]
+
+
+def more_routes(source: Dataset, name: str, count: int, *, seed: int, cache: Path) -> list[Route]:
+    """`count` paths of a house that the data set lacks, of the same lengths, each worded three times; fewer where the
+    house has fewer. They are kept in the cache."""
+    code = code_digest("embodied.language.people_language", "embodied.assistants.route_system")
+    path = cache / "paths" / f"{digest([source.digest, name, count, seed, code])[:32]}.jsonl"
+    if not path.exists():
+        known = {route.path for route in source.routes(name)}
+        world = source.open_world(name, load_catalogue(cache), cache)
+        rng = stream(seed, "nav", "more", name)
+        every = sampled_paths(world.graph, len(world.graph.positions) ** 2, rng=rng)
+        paths = [p for p in every if p not in known][:count]
+        save_lines(path, worded(world, paths, ("train_seen",) * 3, seed=seed, language=People()))
+    return list(load_lines(path, Route))

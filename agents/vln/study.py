@@ -11,8 +11,8 @@ from embodied.agents.common.session import Note
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy
-from embodied.agents.vln.agent import VlnAgent
 from embodied.agents.vln.config import MEASURES, FollowerSettings
+from embodied.agents.vln.policy import VlnAgent
 from embodied.agents.vln.run import train_follower
 
 
@@ -47,7 +47,7 @@ class VlnStudy(SightedStudy):
 
     name, agent_kind, all_tables = "vln", VlnAgent, VLN_TABLES
     makers = ("embodied.agents.vln.run",)
-    judges = (*JUDGES, "embodied.agents.vln.agent")
+    judges = (*JUDGES, "embodied.agents.vln.policy")
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         train_follower(self.training_data(), self.settings(train, seed), self.evaluation, home, note=note)

@@ -15,8 +15,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from embodied.action_spaces import node_ahead
-from embodied.agents.common.vocabulary import Vocabulary
-from embodied.agents.common.word_vectors import WordEmbedding
+from embodied.agents.common.vocabulary import Vocabulary, WordEmbedding
 from embodied.agents.find.network import Look
 from embodied.agents.find.policy import WORDS, wanted
 from embodied.agents.vision.training_data import Split

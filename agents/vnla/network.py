@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from embodied.action_spaces import WORDS
 from embodied.agents.common.rows import Rows
-from embodied.agents.common.word_vectors import WordEmbedding
+from embodied.agents.common.vocabulary import WordEmbedding
 from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.looking import READING, Looker
 

@@ -208,7 +208,7 @@ def parsed(args: EvaluateOptions) -> Evaluation:
     Raises:
       ValueError: an unknown kind, split, agent, rule or assistant, or options that do not go together.
     """
-    from embodied.agents.language_models.assistant import assistant_maker
+    from embodied.agents.language_models.agent import assistant_maker
     from embodied.datasets.store import dataset_of
     from embodied.kinds.task_kind import kind_named
 
@@ -292,7 +292,7 @@ def rows_of(names: Iterable[str]) -> dict[str, str]:
 
 def play_split(evaluation: Evaluation, split: SplitData) -> None:
     """Play with the agents without training, and see what a scripted listener makes of the routes that each heard."""
-    from embodied.agents.language_models.routes import followed_replies
+    from embodied.agents.language_models.agent import followed_replies
     from embodied.evaluation.evaluate import evaluate
 
     args, worlds = evaluation.args, seen_places(split.worlds) if evaluation.looks else None
@@ -390,8 +390,7 @@ def agent_of(evaluation: Evaluation, name: str, split: SplitData, worlds: Mappin
         kind = evaluation.kind
         return kind.agent(name, worlds) if name in kind.agent_names else submitted(name)
     from embodied.agents.language_models.agent import LanguageModelAgent
-    from embodied.agents.language_models.observations import oracle_names
-    from embodied.agents.language_models.prompts import PromptBuilder, agent_prompt
+    from embodied.agents.language_models.prompts import PromptBuilder, agent_prompt, oracle_names
     from embodied.gym.sensors import PanoramaStore
     from embodied.world import World
 

@@ -73,7 +73,7 @@ NEEDED = ("starlette", "uvicorn", "websockets")
 def run(args: PeopleStudyOptions) -> None:
     if missing := [n for n in NEEDED if importlib.util.find_spec(n) is None]:
         raise UnableError(f"the server needs {', '.join(missing)}; run: pip install '{DISTRIBUTION}[serve]'")
-    from embodied.agents.language_models.assistant import assistant_maker
+    from embodied.agents.language_models.agent import assistant_maker
     from embodied.serve.run import open_study, serve
     from embodied.serve.study import load_study
 

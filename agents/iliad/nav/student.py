@@ -1,4 +1,5 @@
-"""Followers in houses: what they see, and the student and the executor that they make."""
+"""Followers in houses: what they see, and the student and the executor that they make; and the data of NAV: paths of a
+data set `vln` or `hanna` with their wordings (3.2.4.2, C.1.1; docs/sources.md, S142)."""
 
 from __future__ import annotations
 
@@ -16,12 +17,14 @@ from embodied.agents.common.choosing import Choice, greedy_choice, sampled_choic
 from embodied.agents.common.losses import IGNORE, negative_log_likelihood
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.hanna.inputs import orientation
-from embodied.agents.iliad.nav.config import NavConfig
+from embodied.agents.iliad.config import NavConfig
 from embodied.agents.iliad.nav.world import MOVES, NavWalk, Trip, share_left, walk_along, without_loops
 from embodied.agents.iliad.protocol import ExecutionScores
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vln.network import COPIES, FollowerNetwork, FollowerOutputs, FollowerViews
+from embodied.assets.cache import digest
 from embodied.assets.records import ROOM_KINDS
+from embodied.datasets.store import Dataset
 from embodied.geometry import wrap
 from embodied.interface import TURNS, VIEW_PITCHES, VIEW_YAWS, Place, Pose, Sight
 from embodied.teachers.shortest import next_node
@@ -243,3 +246,26 @@ class Track:
         if number:
             self.pose = self.ways.poses[number - 1]
             self.nodes.append(self.pose.node)
+
+
+NAV_SPLITS = {"train": "train", "validation": "val_unseen", "test": "test_unseen"}
+"""NAV's splits and the data set's: other houses in each."""
+
+
+@dataclass(frozen=True, eq=False)
+class NavData:
+    """All that worlds and teachers are made of."""
+
+    source: Dataset
+    eyes: NavEyes
+    splits: Mapping[str, Sequence[Trip]]
+    """'train': paths with all of their wordings. 'validation' and 'test': paths of other houses; each wording is a trip
+    of its own."""
+    pictures: str
+    """How what is seen was drawn: 'fast_256', 'unlit_192', or several of them."""
+
+    @property
+    def digest(self) -> str:
+        """Names the content: the data set, its paths, and who looks at which pictures."""
+        trips = {part: [(t.world, t.path, t.requests) for t in many] for part, many in self.splits.items()}
+        return digest([self.source.digest, trips, self.eyes.bank.digest, self.pictures])

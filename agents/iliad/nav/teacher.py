@@ -1,4 +1,8 @@
-"""Who describes walks: a describer with an executor (3.2.4.1), or the people who word routes here."""
+"""Who describes walks: a describer with an executor (3.2.4.1), or the people who word routes here.
+
+The describer of NAV (Figure C.4) reads a walk and writes; who follows is agents.vln.network's follower. B walks, T
+steps, E size of a view's features and direction, h hidden size.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +11,50 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import torch
 import torch.nn.functional as F
-from torch import Tensor
+from torch import Tensor, nn
 
-from embodied.agents.common.choosing import greedy_choice, sampled_choice
-from embodied.agents.common.vocabulary import Vocabulary
-from embodied.agents.iliad.describing import DescribingNetworks
-from embodied.agents.iliad.nav.network import WalkDescriber
+from embodied.agents.common.choosing import Choice, greedy_choice, sampled_choice
+from embodied.agents.common.vocabulary import END_NUMBER, Vocabulary
+from embodied.agents.hanna.attention import DotAttend, FeedForward, MultiAttend
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent, Track
 from embodied.agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
-from embodied.agents.iliad.protocol import NOTHING
+from embodied.agents.iliad.protocol import NOTHING, DescribingNetworks
+from embodied.agents.iliad.writing import AttentiveWriter, Bridge, Remembered, before, write
 from embodied.interface import SeenPlace
 from embodied.kinds.metrics import sdtw
+
+
+class WalkDescriber(nn.Module):
+    """p(words | walk): one Transformer layer over the steps, read with attention (docs/sources.md, S104)."""
+
+    def __init__(self, words: int, size: int, heads: int, seen: int, horizon: int) -> None:
+        super().__init__()
+        self.look = DotAttend(seen, seen, size)
+        self.enter, self.time = nn.Linear(2 * seen, size), nn.Embedding(horizon, size)
+        self.relate, self.feed = MultiAttend(size, heads, 0.0), FeedForward(size, 0.0)
+        self.first = Bridge(size)
+        self.writer = AttentiveWriter(words, size, size, memories=1)
+
+    def read(self, views: Tensor, actions: Tensor, mask: Tensor) -> tuple[tuple[Tensor, Tensor], list[Remembered]]:
+        """(B, T, 36, E) panoramas, (B, T, E) actions taken there, (B, T) which there are: what is written from."""
+        b, t = mask.shape
+        looked = self.look(actions.flatten(0, 1), views.flatten(0, 1)).view(b, t, -1)
+        x = torch.relu(self.enter(torch.cat([actions, looked], -1))) + self.time.weight[:t]
+        x = self.feed(self.relate(x, self.relate.key(x), self.relate.value(x), mask))
+        mean = (x * mask[..., None]).sum(1) / mask.sum(1, keepdim=True)
+        return self.first(mean), [self.writer.remember(0, x, mask)]
+
+    def forward(self, views: Tensor, actions: Tensor, mask: Tensor, written: Tensor) -> Tensor:
+        """Logits (B, W, V) before each of the given words (B, W)."""
+        return self.writer(before(written, END_NUMBER), *self.read(views, actions, mask))[0]
+
+    @torch.no_grad()
+    def write(
+        self, views: Tensor, actions: Tensor, mask: Tensor, choose: Choice, longest: int, copies: int = 1
+    ) -> Tensor:
+        """(copies B, at most `longest`) words; the copies of one description stand one behind the other."""
+        return write(self.writer, *self.read(views, actions, mask), choose, longest, END_NUMBER, copies)
+
 
 THRESHOLD = 0.5
 """Tau of Eq 3.15 and 3.16, of SDTW (C.1.1)."""

@@ -1,4 +1,5 @@
-"""The data of REGEX: words, rules that change them, and requests for the rules, split by template (C.1.2)."""
+"""The data of REGEX: words, made up by the seed, rules that change them, and requests for the rules, split by template
+(C.1.2)."""
 
 from __future__ import annotations
 
@@ -10,12 +11,46 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from embodied.agents.iliad.regex.config import RegexConfig
+from embodied.agents.iliad.config import RegexConfig
 from embodied.agents.iliad.regex.language import PARTS, RequestTemplate, templates
 from embodied.agents.iliad.regex.rules import RuleShape, compiled, outputs, random_rule, random_shape
-from embodied.agents.iliad.regex.words import made_up
 from embodied.assets.cache import digest
 from embodied.seeds import stream
+
+_WORD_PARTS = {
+    "start": "- - - - - a e i o u re un in de dis ex en over out",
+    "onset": "b c d f g h j k l m n p r s t v w y z bl br ch cl cr dr fl fr gl gr pl pr qu sc sh sk sl sm sn sp st sw "
+    "th tr tw wh",
+    "nucleus": "a e i o u a e i o e i a ea ee ai ou oo ie au io",
+    "coda": "- - - - b d g k l m n p r s t x ck ct ft ld ll mp nd ng nk nt pt rd rk rm rn rt sh sk ss st th",
+    "ending": "- - - s ed er ing ly ness ment able al ous ive ion ist ful less ic y en",
+}
+WORD_PARTS = {name: text.split() for name, text in _WORD_PARTS.items()}
+"""Of made-up words; '-' is none."""
+SHORTEST, LONGEST_MADE_UP = 3, 10
+"""Letters of a word."""
+
+
+def made_up(count: int, *, seed: int) -> tuple[str, ...]:
+    """So many different words that could be English ones; the same on every machine.
+
+    The dissertation's words are the dictionary of an operating system, which differs from one to the
+    next and is often missing (docs/sources.md, S90).
+    """
+    rng = stream(seed, "regex", "words")
+    words: dict[str, None] = {}
+    while len(words) < count:
+        word = _word(rng=rng)
+        if SHORTEST <= len(word) <= LONGEST_MADE_UP:
+            words[word] = None
+    return tuple(words)
+
+
+def _word(*, rng: np.random.Generator) -> str:
+    pick = lambda name: WORD_PARTS[name][int(rng.integers(len(WORD_PARTS[name])))]
+    middle = "".join(pick("onset") + pick("nucleus") + pick("coda") for _ in range(int(rng.integers(1, 3))))
+    return (pick("start") + middle + pick("ending")).replace("-", "")
+
 
 REQUESTS = 3
 """Requests of a data point of the simulation split."""

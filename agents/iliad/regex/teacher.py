@@ -8,12 +8,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from embodied.agents.common.choosing import greedy_choice, sampled_choice
-from embodied.agents.iliad.describing import DescribingNetworks
-from embodied.agents.iliad.protocol import NOTHING, one_request
-from embodied.agents.iliad.regex.coding import LONGEST_REQUEST, Requests, changes, characters, texts
-from embodied.agents.iliad.regex.config import RegexConfig
+from embodied.agents.iliad.config import RegexConfig
+from embodied.agents.iliad.protocol import NOTHING, DescribingNetworks, one_request
 from embodied.agents.iliad.regex.data import Grammar, WordTask
-from embodied.agents.iliad.regex.networks import ChangeDescriber, Speller
+from embodied.agents.iliad.regex.networks import (
+    LONGEST_REQUEST,
+    ChangeDescriber,
+    Requests,
+    Speller,
+    changes,
+    characters,
+    texts,
+)
 from embodied.agents.iliad.regex.rules import LETTERS, REPLACEMENTS, SAME, RuleShape
 from embodied.agents.iliad.regex.world import Written
 

@@ -11,9 +11,8 @@ from torch import Tensor
 
 from embodied.agents.common.choosing import Choice, greedy_choice, sampled_choice
 from embodied.agents.iliad.protocol import ExecutionScores, one_request
-from embodied.agents.iliad.regex.coding import PAD, Requests, characters, texts
 from embodied.agents.iliad.regex.data import WordTask
-from embodied.agents.iliad.regex.networks import Speller
+from embodied.agents.iliad.regex.networks import PAD, Requests, Speller, characters, texts
 from embodied.agents.iliad.regex.rules import LONGEST_BLOCK, edit_distance, outputs
 
 
