@@ -6,7 +6,7 @@ import numpy as np
 from hand_worlds import grid_world
 
 from embodied.agents.common.vocabulary import build_vocabulary
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.training_data import Split
 from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent
 from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings

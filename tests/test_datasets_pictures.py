@@ -11,7 +11,7 @@ import pytest
 from hand_data import build, random_encoder, small_house
 from handmade import HandCatalogue
 
-from embodied.agents.vision import drawn, extract
+from embodied.agents.vision import extract
 from embodied.agents.vision import run as vision
 from embodied.agents.vision.config import LATER_CAMERA, PLAIN, RENDER_PRESETS, SAME_TIME
 from embodied.agents.vision.extract import Extractor, captured_path
@@ -48,7 +48,7 @@ def data(tmp_path_factory) -> Dataset:
 
 @pytest.fixture(autouse=True)
 def hand_catalogue(monkeypatch):
-    for module in (building, drawn, extract):
+    for module in (building, extract):
         monkeypatch.setattr(module, "load_catalogue", lambda *_, **__: HandCatalogue())
 
 

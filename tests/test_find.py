@@ -14,8 +14,8 @@ from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.find.config import FinderConfig
 from embodied.agents.find.network import AROUND, READ, Explorer, SeekNetwork
 from embodied.agents.find.policy import STOP, WORDS, Search, WayMap, costs_of
-from embodied.agents.find.run import Finder, FinderAbout, FindLearner, Labels, new_finder, tasks_in
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.find.study import Finder, FinderAbout, FindLearner, Labels, new_finder, tasks_in
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.training_data import Split
 from embodied.evaluation.evaluate import play
 from embodied.interface import Move, Sight
@@ -100,7 +100,7 @@ def test_a_teacher_counts_the_metres_that_are_left_after_each_option():
 
 
 def test_who_sees_learns_to_find_things_and_who_is_blind_does_not(tmp_path, monkeypatch):
-    monkeypatch.setattr("embodied.agents.find.run.SINGLE_VIEWS", 0.9)
+    monkeypatch.setattr("embodied.agents.find.study.SINGLE_VIEWS", 0.9)
     split = split_of(grid_world(4))
     finder, blind = finder_for(split, iterations=60), finder_for(split, sees="nothing", iterations=50)
     for agent in (finder, blind):

@@ -30,7 +30,6 @@ from embodied.agents.common.session import (
 )
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
 from embodied.agents.hanna.agent import HannaAbout, HannaAgent
-from embodied.agents.hanna.asking import RULES, ask_above
 from embodied.agents.hanna.policy import for_training
 from embodied.agents.hanna.run import (
     IGNORE,
@@ -43,8 +42,8 @@ from embodied.agents.hanna.run import (
     negative_log_likelihood,
     reason_loss,
 )
-from embodied.agents.hanna.training_config import EVALUATIONS, HANNA_SCALES, TrainingConfig
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.hanna.training_config import EVALUATIONS, HANNA_SCALES, RULES, TrainingConfig, ask_above
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.training_data import Split
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes

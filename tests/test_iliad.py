@@ -12,8 +12,15 @@ from torch import Tensor, nn
 
 from embodied.agents.common.session import descend
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
-from embodied.agents.iliad.learners import RequestBatch, adel, adel_loss, dagger, reinforce, reinforce_loss
-from embodied.agents.iliad.protocol import ExecutionScores
+from embodied.agents.iliad.protocol import (
+    ExecutionScores,
+    RequestBatch,
+    adel,
+    adel_loss,
+    dagger,
+    reinforce,
+    reinforce_loss,
+)
 from embodied.agents.iliad.training import IliadProblem, episodes_to, success_rate, train
 from embodied.seeds import stream
 

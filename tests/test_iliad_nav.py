@@ -32,7 +32,7 @@ from embodied.agents.iliad.nav.world import (
     without_loops,
 )
 from embodied.agents.iliad.training import IliadProblem, success_rate, train
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vln.network import COPIES
 from embodied.assets.records import ROOM_KINDS
 from embodied.interface import Pose, Route

@@ -55,8 +55,8 @@ def test_houses_to_validate_and_to_test_in_are_nobodys_to_learn_from(grounds):
 
 def test_more_paths_are_others_worded_once_and_kept(grounds, source, monkeypatch):
     """Said plainly here: houses made by hand hold nothing that people have words for."""
-    monkeypatch.setattr("embodied.agents.vln.run.load_catalogue", lambda cache: None)
-    monkeypatch.setattr("embodied.agents.vln.run.People", PlainLanguage)
+    monkeypatch.setattr("embodied.agents.vln.study.load_catalogue", lambda cache: None)
+    monkeypatch.setattr("embodied.agents.vln.study.People", PlainLanguage)
     monkeypatch.setattr(Dataset, "open_world", lambda self, name, catalogue, cache: self.place(name))
     more = dataclasses.replace(source, config=dataclasses.replace(SMALL, more_paths=7))
     found, few = more.data().splits, grounds.data.splits

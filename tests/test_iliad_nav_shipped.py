@@ -12,8 +12,8 @@ from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.iliad.nav.run import load_follower
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent
 from embodied.agents.iliad.nav.world import MOVES, Trip, walk_along
-from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
+from embodied.agents.vision.features import FeatureBank
 from embodied.interface import Pose
 
 WORLD = grid_world()

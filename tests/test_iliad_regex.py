@@ -37,8 +37,17 @@ from embodied.agents.iliad.regex.rules import (
     random_rule,
 )
 from embodied.agents.iliad.regex.run import RegexSetup, load_student, new_network
-from embodied.agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher, parse
-from embodied.agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Written, carried_out, nearness
+from embodied.agents.iliad.regex.teacher import (
+    GrammarTeacher,
+    LearnedTeacher,
+    RegexMarginal,
+    RegexStudent,
+    RegexWorld,
+    Written,
+    carried_out,
+    nearness,
+    parse,
+)
 from embodied.agents.iliad.study import IliadStudy
 from embodied.agents.iliad.training import IliadProblem, train
 from embodied.agents.studies.engine import run_study

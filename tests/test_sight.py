@@ -14,7 +14,7 @@ from hand_vnla import lesson
 from test_hanna_learner import agent_for, setting
 
 from embodied.agents.hanna.agent import hanna_policies
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.training_data import Split
 from embodied.evaluation.evaluate import play
 from embodied.interface import Agent, Episode, Observation, Sight, Viewpoint, is_picture, viewpoint
@@ -23,7 +23,7 @@ from embodied.kinds import metrics
 ROOT = Path(__file__).resolve().parent.parent
 SEEING = {
     "agents/language_models/prompts.py",
-    "agents/vision/bank.py",
+    "agents/vision/features.py",
     "agents/vision/live.py",
     "embodied/policies/doors.py",
 }

@@ -15,12 +15,12 @@ from hand_pixels import coloured_strips
 
 from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.weights import read_weights, save_tensors
-from embodied.agents.vision import labels, strip
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision import encoder as strip
+from embodied.agents.vision import labels
 from embodied.agents.vision.config import PLAIN, RENDER_PRESETS, VisionConfig, drawing
 from embodied.agents.vision.detector import LabelledFeatures, average_precision, read
 from embodied.agents.vision.encoder import load_encoder, pool_views, save_encoder, strip_map, whitening
-from embodied.agents.vision.features import feature_path, load_features, save_features
+from embodied.agents.vision.features import FeatureBank, feature_path, load_features, save_features
 from embodied.agents.vision.lite import Lite, folded, load_imagenet
 from embodied.agents.vision.training import train_encoder
 from embodied.errors import UnableError

@@ -8,8 +8,7 @@ from hand_pixels import coloured_strips
 from embodied.agents.common.weights import origin_of
 from embodied.agents.vision.config import StripTraining
 from embodied.agents.vision.detector import Detector, train_detector
-from embodied.agents.vision.encoder import load_encoder
-from embodied.agents.vision.strip import CELL, STRIP_COLUMNS, STRIP_ROWS, cell_direction, directions
+from embodied.agents.vision.encoder import CELL, STRIP_COLUMNS, STRIP_ROWS, cell_direction, directions, load_encoder
 from embodied.render.panorama import Panorama
 
 FACES = (6, 32, 32)

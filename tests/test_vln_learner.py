@@ -14,13 +14,13 @@ from hand_worlds import grid_world
 from embodied.agents.common.losses import IGNORE
 from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VLN
 from embodied.agents.common.vocabulary import build_vocabulary
-from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.training_data import Split
 from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.network import FollowerOutputs
 from embodied.agents.vln.policy import VlnAbout, VlnAgent, VlnMoment
-from embodied.agents.vln.run import VlnLearner, losses_of, teacher_share
+from embodied.agents.vln.study import VlnLearner, losses_of, teacher_share
 from embodied.assistants.route_system import build_routes
 from embodied.datasets.store import dataset_of
 from embodied.evaluation.evaluate import play

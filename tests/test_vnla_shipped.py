@@ -9,8 +9,8 @@ from hand_vnla import tasks_of
 from hand_worlds import grid_world
 
 from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VNLA
-from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vnla.agent import LEARNED, VnlaAgent
 from embodied.evaluation.evaluate import play
 from embodied.interface import Episode

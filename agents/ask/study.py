@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from embodied.agents.ask.config import AskerConfig, AskEvaluation
-from embodied.agents.ask.foresight import Foresight
-from embodied.agents.ask.learned import Decisions, LearnedAsker, load_asker, shown, train
+from embodied.agents.ask.learned import Decisions, Foresight, LearnedAsker, load_asker, shown, train
 from embodied.agents.common.session import Note
 from embodied.agents.common.weights import save_weights
 from embodied.agents.studies.engine import Measured, StudyLearner
@@ -79,7 +78,7 @@ class AskStudy(StudyLearner):
     """All that its answers depend on."""
 
     name = "ask"
-    judges = ("embodied.agents.ask.foresight", "embodied.agents.ask.study")
+    judges = ("embodied.agents.ask.learned", "embodied.agents.ask.study")
 
     def tables(self) -> Mapping[str, StudyTable]:
         model, columns = (_rule(MODEL),) if self.model else (), (*ASK.columns, *ASK.metrics, *metrics.USAGE)

@@ -21,7 +21,7 @@ from embodied.agents.common.choosing import Chooser, choose_greedily
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.find.network import SeekNetwork
 from embodied.agents.hanna.topological_map import SAME_PLACE, fewest_moves, matches
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.features import FeatureBank
 from embodied.geometry import wrap
 from embodied.interface import Action, Actions, Move, Observation, Observations, Rngs, Situation, Situations, Stop
 

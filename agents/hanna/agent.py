@@ -15,14 +15,13 @@ import torch
 from embodied.agents.common.choosing import choose_at
 from embodied.agents.common.sighted import About, SightedAgent
 from embodied.agents.common.weights import check_features
-from embodied.agents.hanna.asking import RULES, ask_patiently
 from embodied.agents.hanna.inputs import Percept
 from embodied.agents.hanna.lstm import LstmNetwork
 from embodied.agents.hanna.network import AgentNetwork, HannaNetwork, Scores
 from embodied.agents.hanna.policy import HannaMemory, HannaPolicy
 from embodied.agents.hanna.topological_map import MapPolicy, PerfectInterpretation
-from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.hanna.training_config import RULES, HannaEvaluation, TrainingConfig, ask_patiently
+from embodied.agents.vision.features import FeatureBank
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent
 

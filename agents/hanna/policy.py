@@ -14,7 +14,6 @@ from torch import Tensor
 from embodied.agents.common.choosing import Chooser, choose_greedily, choose_sampled
 from embodied.agents.common.rows import RunningRows, hidden_channels
 from embodied.agents.common.vocabulary import Vocabulary
-from embodied.agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
 from embodied.agents.hanna.inputs import (
     COPIES,
     DO_NOTHING,
@@ -28,7 +27,8 @@ from embodied.agents.hanna.inputs import (
     orientation,
 )
 from embodied.agents.hanna.network import AgentNetwork, Scores
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.hanna.training_config import RULES, HannaAskRule, ask_greedily, ask_sampled
+from embodied.agents.vision.features import FeatureBank
 from embodied.interface import (
     Action,
     Actions,

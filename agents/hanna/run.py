@@ -31,11 +31,10 @@ from embodied.agents.common.losses import IGNORE, negative_log_likelihood
 from embodied.agents.common.session import Progress
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.hanna.agent import HannaAbout, HannaAgent
-from embodied.agents.hanna.asking import RULES
 from embodied.agents.hanna.inputs import action_index
 from embodied.agents.hanna.policy import HannaMemory, StepScores, for_training
-from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.hanna.training_config import RULES, HannaEvaluation, TrainingConfig
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.datasets.store import Dataset
 from embodied.identity import identity_of

@@ -18,8 +18,19 @@ from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate, tasks_of_update
 from embodied.agents.common.weights import load_into, origin_of, read_weights, save_weights
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
-from embodied.agents.iliad.learners import IliadLesson, RequestBatch, adel, dagger, reinforce
-from embodied.agents.iliad.protocol import DescribingTeacher, Marginal, RequestWorld, Student, Tasks, one_request
+from embodied.agents.iliad.protocol import (
+    DescribingTeacher,
+    IliadLesson,
+    Marginal,
+    RequestBatch,
+    RequestWorld,
+    Student,
+    Tasks,
+    adel,
+    dagger,
+    one_request,
+    reinforce,
+)
 from embodied.identity import Identity, differences, identity_of
 from embodied.seeds import stream
 

@@ -57,7 +57,7 @@ class NavTraining(IliadTraining, Nav):
 @dataclass(frozen=True, kw_only=True)
 class IliadStudyOptions(StudyOptions, Repeated, ScaledDown):
     tables: Tables
-    """Make these tables: 3.4, 3.5, C.1, 'figure 3.7' or algorithms."""
+    """Make these tables: 3.4, 3.5, C.1 or 'figure 3.7'."""
 
 
 @dataclass(frozen=True, kw_only=True)

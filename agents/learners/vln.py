@@ -48,7 +48,7 @@ class VlnStudyOptions(EpisodeStudyOptions, Encoded):
 
 
 def follower(args: FollowerTraining, **session: Any) -> None:
-    from embodied.agents.vln.run import train_follower
+    from embodied.agents.vln.study import train_follower
 
     source = training_data(args, "vln", args.device)
     train_follower(source, args.config, args.evaluation, args.out, minutes=args.minutes, **session)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from embodied.agents.vision.encoder import CELL, HEIGHT, STRIP_COLUMNS, STRIP_ROWS, WIDTH, windows
 from embodied.agents.vision.features import EQUIRECT, margin, strip_of
-from embodied.agents.vision.strip import CELL, HEIGHT, STRIP_COLUMNS, STRIP_ROWS, WIDTH, windows
 from embodied.assets.cache import DAMAGED, atomic_path
 from embodied.assets.decoding import open_arrays
 from embodied.assets.records import ROOM_KINDS

@@ -14,9 +14,8 @@ from embodied.agents.common.parallel import check_device
 from embodied.agents.common.session import Note
 from embodied.agents.vision.config import StripTraining, VisionConfig, drawing
 from embodied.agents.vision.detector import labelled, read, train_detector
-from embodied.agents.vision.drawn import StripSource, drawings_of, pictures_of
 from embodied.agents.vision.encoder import Encoder, load_encoder, save_encoder
-from embodied.agents.vision.extract import Extractor
+from embodied.agents.vision.extract import Extractor, StripSource, drawings_of, pictures_of
 from embodied.agents.vision.training import train_encoder, whitened
 from embodied.assets.cache import write_json
 from embodied.datasets.build import for_each_unit

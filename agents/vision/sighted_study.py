@@ -12,8 +12,8 @@ from embodied.agents.common.settings import EvaluationSettings, ImitationSetting
 from embodied.agents.common.sighted import SightedAgent
 from embodied.agents.studies.episodes import EpisodeStudy
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.training_data import TrainingData
 from embodied.assets.cache import default_cache
 from embodied.datasets.store import dataset_of

@@ -25,10 +25,18 @@ from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.session import Note, Session, descend
 from embodied.agents.common.weights import seeded
 from embodied.agents.vision.config import StripTraining, VisionConfig
-from embodied.agents.vision.encoder import ENCODER_NETWORKS, Encoder, Network, pool_views, strip_map, whitening
+from embodied.agents.vision.encoder import (
+    CELL,
+    ENCODER_NETWORKS,
+    STRIP_COLUMNS,
+    Encoder,
+    Network,
+    pool_views,
+    strip_map,
+    whitening,
+)
 from embodied.agents.vision.labels import HouseStrips, visible_in_views
 from embodied.agents.vision.lite import Lite, load_imagenet
-from embodied.agents.vision.strip import CELL, STRIP_COLUMNS
 from embodied.assets.cache import digest
 from embodied.assets.records import ROOM_KINDS
 from embodied.records import Identity, identity_of

@@ -13,11 +13,10 @@ from embodied.agents.common.settings import EvaluationSettings, ImitationSetting
 from embodied.agents.common.sighted import About
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.learner import PlaySettings
-from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.config import SAME_TIME
-from embodied.agents.vision.drawn import drawings_of, drawn_world, pictures_of
 from embodied.agents.vision.encoder import Encoder, load_encoder
-from embodied.agents.vision.extract import house_features
+from embodied.agents.vision.extract import drawings_of, drawn_world, house_features, pictures_of
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.live import LiveFeatures
 from embodied.assets.cache import default_cache
 from embodied.datasets.store import Dataset
@@ -41,7 +40,7 @@ class TrainingData:
     data: Dataset
     encoder: Encoder
     picture_kind: str | None = None
-    """Of the pictures that the features come from, as in embodied.agents.vision.drawn.pictures_of."""
+    """Of the pictures that the features come from, as in embodied.agents.vision.extract.pictures_of."""
     device: str = "cpu"
     goal_image: str = SAME_TIME
     """One of embodied.agents.vision.config.GOAL_IMAGES."""

@@ -17,7 +17,7 @@ from embodied.agents.common.sighted import About, SightedAgent
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.common.weights import check_features
 from embodied.agents.hanna.inputs import action_index, candidate_rows, orientation
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.network import COPIES, FollowerNetwork, FollowerOutputs, FollowerState, FollowerViews
 from embodied.assets.records import ROOM_KINDS

@@ -1,19 +1,139 @@
-"""Tables of VLN as data, and VLN as a learner of the engine."""
+"""The training of a follower: imitation of the shortest path, in the loop of agents.common.imitation; and the tables of
+VLN as data, as a learner of the engine.
+
+    episodes = play tasks, actions of teacher or follower (FORCING)                                  (policy)
+    loss = - log pi(a*) + progress_weight (left - left*)^2 - room_weight log p(room*)                (`losses_of`)
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
-from embodied.agents.common.session import Note
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from embodied.agents.common import imitation
+from embodied.agents.common.choosing import choose_sampled
+from embodied.agents.common.losses import IGNORE, negative_log_likelihood
+from embodied.agents.common.session import Note, Progress
+from embodied.agents.common.settings import EvaluationSettings
+from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy
+from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.agents.vln.config import MEASURES, FollowerSettings
-from embodied.agents.vln.policy import VlnAgent
-from embodied.agents.vln.run import train_follower
+from embodied.agents.vln.policy import VlnAbout, VlnAgent, VlnMoment
+from embodied.assets.cache import digest
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.closure import code_digest
+from embodied.assistants.route_system import sampled_paths, worded
+from embodied.datasets.store import Dataset
+from embodied.identity import identity_of
+from embodied.interface import Agent, Episode, Route, Task
+from embodied.language import People
+from embodied.records import load_lines, save_lines
+from embodied.seeds import stream
+from embodied.tasks.vln import vln_task
+
+LONGEST_EPISODE = 12
+"""Steps of an episode of training: described paths have at most six, and who is lost learns little more."""
+
+
+class VlnLearner(imitation.ImitationLearner):
+    """A follower in training."""
+
+    optimizer_kind = torch.optim.AdamW
+
+    def training_task(self, task: Task) -> Task:
+        return dataclasses.replace(task, horizon=min(task.horizon, LONGEST_EPISODE))
+
+    def player(self, update: int, bank: FeatureBank) -> Agent:
+        dropout, share = self.config.environment_dropout, teacher_share(self.config, update)
+        policy = dataclasses.replace(self.agent.policy(bank), choose=choose_sampled, environment_dropout=dropout)
+        return imitation.Supervised(policy, {"guided": lambda _, rng: bool(rng.random() < share)})
+
+    def loss_of(self, episodes: Sequence[Episode], experience: Sequence[VlnMoment]) -> imitation.BatchLoss:
+        c = self.config
+        moves, left, rooms = losses_of(experience, c.batch)
+        right = torch.cat([m.said.moves.argmax(-1) == m.moves for m in experience])
+        known = torch.cat([m.rooms.flatten() for m in experience])
+        guessed = torch.cat([m.said.rooms.argmax(-1).flatten() for m in experience])
+        numbers = {
+            "right moves": float(right.float().mean()),
+            "right rooms": float((guessed == known)[known != IGNORE].float().mean()),
+            **imitation.played(episodes, self.training.worlds),
+        }
+        loss = moves + c.progress_weight * left + c.room_weight * rooms
+        return imitation.BatchLoss((moves, torch.zeros(())), loss, numbers)
+
+
+def teacher_share(config: FollowerSettings, update: int) -> float:
+    """Share of the steps in which the teacher acts; of 'dagger' it falls to the least over the first half."""
+    if config.forcing == "dagger":
+        return max(config.least_teacher, 1.0 - 2.0 * update / config.iterations)
+    return float(config.forcing == "teacher")
+
+
+def losses_of(moments: Sequence[VlnMoment], episodes: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Of actions, of the way that is left and of rooms, each summed over steps and averaged over episodes."""
+    moves = sum(negative_log_likelihood(m.said.moves, m.moves).sum() for m in moments)
+    left = sum(F.mse_loss(m.said.left, m.left, reduction="sum") for m in moments)
+    rooms = sum(_rooms(m) for m in moments)
+    return tuple(torch.as_tensor(x) / episodes for x in (moves, left, rooms))  # type: ignore[return-value]
+
+
+def _rooms(m: VlnMoment) -> Tensor:
+    """-log p of the kinds of rooms, averaged over the actions of a step."""
+    lost = negative_log_likelihood(m.said.rooms.flatten(0, 1), m.rooms.flatten()).view(m.rooms.shape)
+    return (lost.sum(1) / (m.rooms != IGNORE).sum(1)).sum()
+
+
+def train_follower(
+    source: TrainingData,
+    config: FollowerSettings,
+    evaluation: EvaluationSettings,
+    folder: Path,
+    **options: Unpack[imitation.Options],
+) -> Progress:
+    """Train, or go on training, the follower of a run folder; other arguments as in agents.common.imitation.train."""
+    training = source.split("train", houses=config.training_houses or None)
+    validation = source.split("val_unseen", limit=config.validation_tasks)
+    if config.more_paths:
+        training = dataclasses.replace(training, tasks=[*training.tasks, *more_tasks(source, training, config)])
+    words = build_vocabulary(t.request for t in training.tasks)
+    agent = VlnAgent.new(source.about(VlnAbout, config, evaluation, words))
+    agent.network.to(source.device)
+    identity = identity_of("embodied.agents.vln.study", settings=config, **source.identity())
+    return imitation.train(VlnLearner(agent, training), validation, folder, identity, **options)
+
+
+def more_tasks(source: TrainingData, training: Split, config: FollowerSettings) -> list[Task]:
+    """Tasks of further paths through the training houses; the same for all training seeds."""
+    more = lambda name: more_routes(source.data, name, config.more_paths, seed=0, cache=source.cache)
+    routes = {name: more(name) for name in training.worlds}
+    return [vln_task(name, route) for name, many in routes.items() for route in many]
+
+
+def more_routes(source: Dataset, name: str, count: int, *, seed: int, cache: Path) -> list[Route]:
+    """`count` paths of a house that the data set lacks, of the same lengths, each worded three times; fewer where the
+    house has fewer. They are kept in the cache."""
+    code = code_digest("embodied.language.people_language", "embodied.assistants.route_system")
+    path = cache / "paths" / f"{digest([source.digest, name, count, seed, code])[:32]}.jsonl"
+    if not path.exists():
+        known = {route.path for route in source.routes(name)}
+        world = source.open_world(name, load_catalogue(cache), cache)
+        rng = stream(seed, "nav", "more", name)
+        every = sampled_paths(world.graph, len(world.graph.positions) ** 2, rng=rng)
+        paths = [p for p in every if p not in known][:count]
+        save_lines(path, worded(world, paths, ("train_seen",) * 3, seed=seed, language=People()))
+    return list(load_lines(path, Route))
 
 
 def _row(label: str, **train: Any) -> StudyRow:
@@ -46,7 +166,7 @@ class VlnStudy(SightedStudy):
     config: FollowerSettings
 
     name, agent_kind, all_tables = "vln", VlnAgent, VLN_TABLES
-    makers = ("embodied.agents.vln.run",)
+    makers = ("embodied.agents.vln.study",)
     judges = (*JUDGES, "embodied.agents.vln.policy")
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:

@@ -9,7 +9,7 @@ from embodied.agents.common.choosing import choose_at
 from embodied.agents.common.imitation import Supervised
 from embodied.agents.common.sighted import About, SightedAgent
 from embodied.agents.common.weights import check_features
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vnla.config import ASK_RULES, VnlaSettings
 from embodied.agents.vnla.network import VnlaNetwork
 from embodied.agents.vnla.policy import VnlaPolicy

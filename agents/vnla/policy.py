@@ -22,7 +22,7 @@ from embodied.agents.common.imitation import Supervised
 from embodied.agents.common.rows import RunningRows
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.find.policy import WORDS as REQUEST
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vnla.looking import READ, turned
 from embodied.agents.vnla.network import ASK, DONT, MOST_LEFT, NO_ASK, NO_MOVE, STOP, ReadText, VnlaNetwork, VnlaPercept
 from embodied.interface import (

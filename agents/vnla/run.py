@@ -22,7 +22,7 @@ from embodied.agents.common.losses import negative_log_likelihood
 from embodied.agents.common.session import Progress, descend, seeded_dropout, set_learning_rate
 from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent, rules_of
 from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings

@@ -159,12 +159,11 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route]) -> di
     help.rrd."""
     from embodied.agents.common.shipped import SHIPPED_AGENT
     from embodied.agents.hanna.agent import HannaAgent, hanna_policies
-    from embodied.agents.vision.bank import FeatureBank
     from embodied.agents.vision.detector import Detector
     from embodied.agents.vision.encoder import load_encoder
-    from embodied.agents.vision.features import encode_panoramas
-    from embodied.evaluation.evaluate import play
-    from embodied.kinds.shipped.hanna import HANNA, hanna_pool, hanna_task
+    from embodied.agents.vision.features import FeatureBank, encode_panoramas
+    from embodied.evaluation.rollout import play
+    from embodied.kinds.shipped.hanna import HANNA
     from embodied.kinds.task_kind import EnvInputs
     from embodied.language import People
     from embodied.viz.sinks import Sinks

@@ -38,7 +38,7 @@ def trained(train: Callable[..., Any], args: Any) -> None:
 
 def recorder(args: Any) -> Callable[[int, Sequence[Episode]], None]:
     """Records the first episodes of each validation for Rerun, with what the agent saw if it has an encoder."""
-    from embodied.agents.vision.drawn import drawn_world, pictures_of
+    from embodied.agents.vision.extract import drawn_world, pictures_of
     from embodied.datasets.store import Dataset
     from embodied.viz.recording import record_episode
     from embodied.viz.sinks import Sinks

@@ -31,12 +31,11 @@ from embodied.agents.iliad.nav.world import HORIZON, NavMarginal, NavWorld, Trip
 from embodied.agents.iliad.protocol import DescribingTeacher
 from embodied.agents.iliad.training import IliadProblem, asked, drawn, success_rate, successes, teach
 from embodied.agents.iliad.writing import likelihood_loss
-from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.drawn import drawings_of
-from embodied.agents.vision.extract import house_features
+from embodied.agents.vision.extract import drawings_of, house_features
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.network import FollowerNetwork
-from embodied.agents.vln.run import more_routes
+from embodied.agents.vln.study import more_routes
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.tables import Samples
@@ -176,7 +175,7 @@ class NavSetup:
     encoder: str
     """Digest of the encoder that made them."""
     picture_kind: str | None
-    """Of the pictures, as in embodied.agents.vision.drawn.pictures_of."""
+    """Of the pictures, as in embodied.agents.vision.extract.pictures_of."""
     cache: Path
     """The cache with the catalogue."""
 

@@ -20,7 +20,7 @@ from embodied.agents.hanna.inputs import orientation
 from embodied.agents.iliad.config import NavConfig
 from embodied.agents.iliad.nav.world import MOVES, NavWalk, Trip, share_left, walk_along, without_loops
 from embodied.agents.iliad.protocol import ExecutionScores
-from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vln.network import COPIES, FollowerNetwork, FollowerOutputs, FollowerViews
 from embodied.assets.cache import digest
 from embodied.assets.records import ROOM_KINDS

@@ -29,8 +29,7 @@ from embodied.agents.iliad.regex.networks import (
     texts,
 )
 from embodied.agents.iliad.regex.rules import outputs
-from embodied.agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher
-from embodied.agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld
+from embodied.agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher, RegexMarginal, RegexStudent, RegexWorld
 from embodied.agents.iliad.training import IliadProblem, Network, asked, drawn, successes, teach
 from embodied.agents.iliad.writing import likelihood_loss
 from embodied.assets.cache import digest
