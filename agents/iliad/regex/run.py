@@ -206,7 +206,7 @@ class RegexGrounds:
             splits["train"], splits["validation"][:VALIDATION_REQUESTS], identity, save,
         )  # fmt: skip
 
-    def judge(self, best: Path, split: str, how: Mapping[str, Any]) -> Samples:
+    def judge(self, best: Path, split: str) -> Samples:
         """Which requests of a split a trained student fulfils."""
         good = successes(RegexWorld(), load_student(best)[0], self.data.splits[split])
         return Samples(tuple(map(float, good)), share=True)
