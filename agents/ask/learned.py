@@ -26,7 +26,7 @@ from embodied.agents.common.weights import load_weights, seeded
 from embodied.assistants.ask import CONFIRM_DISTANCE, in_view
 from embodied.envs.ask import AskEnv
 from embodied.envs.base import HelpEnv
-from embodied.evaluation.rollout import play
+from embodied.evaluation.evaluate import play
 from embodied.interface import (
     Action,
     Actions,

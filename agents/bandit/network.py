@@ -21,7 +21,7 @@ from embodied.agents.common.choosing import Choice, greedy_choice
 from embodied.agents.common.rows import Rows
 from embodied.agents.common.vocabulary import END_NUMBER, PAD_NUMBER, Vocabulary
 from embodied.agents.common.weights import load_into, load_weights, save_weights
-from embodied.identity import Identity
+from embodied.records import Identity
 
 Network = TypeVar("Network", bound=nn.Module)
 SPAN = 0.1

@@ -32,8 +32,7 @@ from embodied.agents.common.session import (
 from embodied.agents.common.settings import MAY_CHANGE
 from embodied.envs.base import HelpEnv
 from embodied.errors import UnableError
-from embodied.evaluation.rollout import play, rollout
-from embodied.identity import Identity
+from embodied.evaluation.evaluate import play, rollout
 from embodied.interface import Actions, Agent, Ask, Episode, Observations, Place, Rngs, Situations, Task, act
 from embodied.kinds import metrics
 from embodied.records import Identity

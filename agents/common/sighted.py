@@ -11,7 +11,7 @@ from torch import nn
 from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
 from embodied.agents.common.vocabulary import Vocabulary, use_vectors, vocabulary_with
 from embodied.agents.common.weights import half_precision, load_into, load_weights, save_weights, seeded
-from embodied.identity import Identity
+from embodied.records import Identity
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,8 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from embodied.assets.cache import write_bytes
-from embodied.identity import Identity
-from embodied.records import from_plain, parse, to_json
+from embodied.records import Identity, from_plain, parse, to_json
 
 CHECKSUM = "checksum"
 """Name of the entry that holds `checksum_of` all else."""

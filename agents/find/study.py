@@ -40,15 +40,15 @@ from embodied.agents.vision.sighted_study import SightedStudy
 from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset, SplitData
-from embodied.evaluation.rollout import play
-from embodied.identity import Identity, identity_of
+from embodied.evaluation.evaluate import play
 from embodied.interface import STEP, TURNS, VIEWS, FindObject, Place, Pose, Sight, Task
 from embodied.kinds import metrics
 from embodied.kinds.shipped.find import FIND
 from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage
+from embodied.records import Identity, identity_of
 from embodied.seeds import stream
-from embodied.tasks.find import find_pool, find_task
+from embodied.tasks.goals import find_pool, find_task
 
 SINGLE_VIEWS = 0.75
 """Share of the updates, at the start, that train only the heads that read single views (later: DAgger, too)."""

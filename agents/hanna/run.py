@@ -37,9 +37,9 @@ from embodied.agents.hanna.training_config import RULES, HannaEvaluation, Traini
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.datasets.store import Dataset
-from embodied.identity import identity_of
 from embodied.interface import Agent, Episode, Place, Task, Teacher
-from embodied.teachers.hanna import HannaTeacher
+from embodied.records import identity_of
+from embodied.teachers.shortest import HannaTeacher
 
 
 @dataclass(frozen=True, eq=False)

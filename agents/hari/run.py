@@ -36,11 +36,10 @@ from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules, shaped_costs
-from embodied.evaluation.evaluate import spread
-from embodied.evaluation.rollout import play
-from embodied.identity import Identity, identity_of
+from embodied.evaluation.evaluate import play, spread
 from embodied.interface import Action, Ask, Episode, Move, Place
 from embodied.kinds import metrics
+from embodied.records import Identity, identity_of
 
 MAY_CHANGE = ("iterations", "checkpoint_minutes", "validate_every", "validation_tasks")
 

@@ -31,7 +31,7 @@ from embodied.agents.iliad.protocol import (
     one_request,
     reinforce,
 )
-from embodied.identity import Identity, differences, identity_of
+from embodied.records import Identity, differences, identity_of
 from embodied.seeds import stream
 
 COOLDOWN = 0.4

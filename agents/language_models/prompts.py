@@ -24,7 +24,7 @@ from embodied.action_spaces import door_actions
 from embodied.agents.language_models.client import Message
 from embodied.agents.language_models.completions import object_schema
 from embodied.assets.json_file import read_text
-from embodied.assistants.words import side
+from embodied.assistants.descriptions import side
 from embodied.geometry import wrap
 from embodied.gym.sensors import PanoramaStore
 from embodied.house.floor_plan import font

@@ -29,8 +29,8 @@ from torch import Tensor
 from embodied.agents.common.shipped import SHIPPED_ENCODER
 from embodied.agents.common.weights import load_into, load_weights, save_weights
 from embodied.agents.vision.lite import COMPACT, LITE, Compact, Lite, folded
-from embodied.identity import Identity
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
+from embodied.records import Identity
 
 HEIGHT, WIDTH = 192, 576
 CELL = 16

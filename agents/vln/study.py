@@ -35,12 +35,11 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.assistants.route_system import sampled_paths, worded
 from embodied.datasets.store import Dataset
-from embodied.identity import identity_of
 from embodied.interface import Agent, Episode, Route, Task
+from embodied.kinds.shipped.vln import vln_task
 from embodied.language import People
-from embodied.records import load_lines, save_lines
+from embodied.records import identity_of, load_lines, save_lines
 from embodied.seeds import stream
-from embodied.tasks.vln import vln_task
 
 LONGEST_EPISODE = 12
 """Steps of an episode of training: described paths have at most six, and who is lost learns little more."""

@@ -162,8 +162,8 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route]) -> di
     from embodied.agents.vision.detector import Detector
     from embodied.agents.vision.encoder import load_encoder
     from embodied.agents.vision.features import FeatureBank, encode_panoramas
-    from embodied.evaluation.rollout import play
-    from embodied.kinds.shipped.hanna import HANNA
+    from embodied.evaluation.evaluate import play
+    from embodied.kinds.shipped.hanna import HANNA, hanna_pool, hanna_task
     from embodied.kinds.task_kind import EnvInputs
     from embodied.language import People
     from embodied.viz.sinks import Sinks

@@ -319,7 +319,7 @@ def play_trained(evaluation: Evaluation, data: Dataset, learner: Learner, file: 
     from embodied.agents.learner import PlaySettings
     from embodied.agents.studies.episodes import JUDGES, evaluate_frozen
     from embodied.agents.vision.extract import pictures_of
-    from embodied.identity import identity_of
+    from embodied.records import identity_of
     from embodied.render.pictures import in_words
 
     args, blind = evaluation.args, set[str]()
