@@ -46,8 +46,7 @@ from embodied.action_spaces import MonocularMoves
 from embodied.agents.common.shipped import SHIPPED_ENCODER
 from embodied.agents.common.weights import seeded
 from embodied.agents.vision.encoder import load_encoder
-from embodied.agents.vision.features import encode_panoramas
-from embodied.agents.vision.labels import look, visible_in_views
+from embodied.agents.vision.features import encode_panoramas, look, visible_in_views
 from embodied.agents.vision.live import shipped_features
 from embodied.assets.cache import atomic_path, default_cache
 from embodied.assets.catalogue import load_catalogue

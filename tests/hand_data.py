@@ -139,7 +139,7 @@ def random_encoder(name="compact", *, seed):
 
 def validations_of(folder):
     """(update, measure, value) of all validations of a run."""
-    from embodied.agents.common.checkpoint import read_checkpoint
+    from embodied.agents.common.weights import read_checkpoint
 
     history = read_checkpoint(folder / "checkpoint.pt")["history"]
     return [(int(entry["update"]), name, value) for entry in history for name, value in entry.items()]

@@ -43,7 +43,7 @@ def pixels(cache: Path) -> HelpGymEnv:
 def coloured_strips(name: str, n: int, *, seed: int):
     """HouseStrips of a world of red cells, each a 'rose', and green ones, a 'fern'; half a view or more is of one
     colour."""
-    from embodied.agents.vision.labels import HouseStrips  # late: processes that only see need no torch
+    from embodied.agents.vision.features import HouseStrips  # late: processes that only see need no torch
 
     rng = np.random.default_rng(seed)
     what = rng.integers(0, 2, (n, 1, 4)).repeat(12, 1).repeat(9, 2)

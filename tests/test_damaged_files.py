@@ -32,18 +32,19 @@ from handmade_models import CUBE, write_own, write_pack
 from PIL import Image
 
 from embodied.agents.bandit.network import TRANSLATOR_REMEDY, BanditAbout
-from embodied.agents.common.checkpoint import restore
 from embodied.agents.common.session import Session
 from embodied.agents.common.vocabulary import build_vocabulary
-from embodied.agents.common.weights import WEIGHTS_FORMAT, load_weights, save_tensors
+from embodied.agents.common.weights import WEIGHTS_FORMAT, load_weights, restore, save_tensors
 from embodied.agents.hanna.agent import HannaAbout, HannaAgent
 from embodied.agents.hanna.training_config import HANNA_SCALES
-from embodied.agents.hari import agent as hari
+from embodied.agents.hari import networks as hari
 from embodied.agents.iliad.nav.run import load_follower
 from embodied.agents.iliad.regex.run import load_student
 from embodied.agents.vision.config import PLAIN
 from embodied.agents.vision.features import load_features, save_features
 from embodied.agents.vision.labels import HouseStrips
+from embodied.agents.vision.features import HouseStrips, load_features, save_features
+from embodied.assets.archives import open_arrays, read_picture
 from embodied.assets.closure import ROOT
 from embodied.assets.decoding import load_record, open_arrays, read_picture, save_record
 from embodied.assets.importing.own import import_own, read_own

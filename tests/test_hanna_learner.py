@@ -18,9 +18,8 @@ from hand_worlds import grid_world
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
-from embodied.agents.common.checkpoint import CheckpointError, restore
-from embodied.agents.common.choosing import choose_at, choose_greedily, choose_sampled
 from embodied.agents.common.imitation import play_with_memory
+from embodied.agents.common.rows import choose_at, choose_greedily, choose_sampled
 from embodied.agents.common.session import (
     DivergedError,
     Session,
@@ -29,10 +28,11 @@ from embodied.agents.common.session import (
     within_standard_error,
 )
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
-from embodied.agents.hanna.agent import HannaAbout, HannaAgent
-from embodied.agents.hanna.policy import for_training
-from embodied.agents.hanna.run import (
+from embodied.agents.common.weights import CheckpointError, restore
+from embodied.agents.hanna.agent import (
     IGNORE,
+    HannaAbout,
+    HannaAgent,
     HannaLearner,
     curiosity,
     help_loss,
@@ -42,6 +42,7 @@ from embodied.agents.hanna.run import (
     negative_log_likelihood,
     reason_loss,
 )
+from embodied.agents.hanna.policy import for_training
 from embodied.agents.hanna.training_config import EVALUATIONS, HANNA_SCALES, RULES, TrainingConfig, ask_above
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.training_data import Split

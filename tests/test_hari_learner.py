@@ -12,12 +12,21 @@ from hand_data import built
 from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.imitation import TaskSet
 from embodied.agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
-from embodied.agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save
+from embodied.agents.common.weights import CheckpointError
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
-from embodied.agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
+from embodied.agents.hari.networks import (
+    INTENTIONS,
+    HariAgent,
+    RecurrentHead,
+    load_agent,
+    load_executor,
+    new_executor,
+    new_heads,
+    save,
+    shown_probabilities,
+)
 from embodied.agents.hari.policy import DO, DONE, Choice, Considered, HariPolicy, Reader, carry, consider, policy_of
 from embodied.agents.hari.pretraining import PretrainingData, guided_share, pretrain, pretraining_success
 from embodied.agents.hari.pretraining import train_step as lesson

@@ -10,7 +10,7 @@ from hand_worlds import grid_world
 
 from embodied.agents.common.shipped import SHIPPED_HARI, WEIGHTS
 from embodied.agents.common.weights import origin_of
-from embodied.agents.hari.agent import HariAgent, load_agent
+from embodied.agents.hari.networks import HariAgent, load_agent
 from embodied.agents.hari.policy import policy_of
 from embodied.evaluation.evaluate import play
 from embodied.kinds import metrics

@@ -7,7 +7,7 @@ import pytest
 import torch
 from hand_worlds import grid_world, line_world
 
-from embodied.agents.common.choosing import greedy_choice
+from embodied.agents.common.rows import greedy_choice
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.hanna.inputs import orientation
 from embodied.agents.iliad.config import LearnerConfig, NavConfig
@@ -33,7 +33,7 @@ from embodied.agents.iliad.nav.world import (
 )
 from embodied.agents.iliad.training import IliadProblem, success_rate, train
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vln.network import COPIES
+from embodied.agents.vln.policy import COPIES
 from embodied.assets.records import ROOM_KINDS
 from embodied.interface import Pose, Route
 from embodied.seeds import stream

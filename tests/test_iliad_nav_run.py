@@ -8,7 +8,7 @@ import pytest
 import torch
 from hand_data import COMPACT, built, noise_features, small_house
 
-from embodied.agents.common.checkpoint import CheckpointError
+from embodied.agents.common.weights import CheckpointError
 from embodied.agents.iliad.config import LearnerConfig, NavConfig
 from embodied.agents.iliad.nav.run import NavSetup, load_follower
 from embodied.agents.iliad.nav.teacher import GrammarNavTeacher

@@ -10,8 +10,8 @@ import torch
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from embodied.agents.common.checkpoint import CheckpointError
-from embodied.agents.common.choosing import greedy_choice
+from embodied.agents.common.rows import greedy_choice
+from embodied.agents.common.weights import CheckpointError
 from embodied.agents.iliad.config import LearnerConfig, RegexConfig
 from embodied.agents.iliad.regex.data import LEAST_CHANGED, WordTask, made_up, make_data, rules_without_requests
 from embodied.agents.iliad.regex.language import PARTS, templates

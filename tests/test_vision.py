@@ -13,10 +13,9 @@ import torch
 from hand_data import random_encoder
 from hand_pixels import coloured_strips
 
-from embodied.agents.common.checkpoint import CheckpointError
-from embodied.agents.common.weights import read_weights, save_tensors
+from embodied.agents.common.weights import CheckpointError, read_weights, save_tensors
 from embodied.agents.vision import encoder as strip
-from embodied.agents.vision import labels
+from embodied.agents.vision import features as labels
 from embodied.agents.vision.config import PLAIN, RENDER_PRESETS, VisionConfig, drawing
 from embodied.agents.vision.detector import LabelledFeatures, average_precision, read
 from embodied.agents.vision.encoder import load_encoder, pool_views, save_encoder, strip_map, whitening

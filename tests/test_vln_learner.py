@@ -18,8 +18,7 @@ from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.training_data import Split
 from embodied.agents.vln.config import FollowerSettings
-from embodied.agents.vln.network import FollowerOutputs
-from embodied.agents.vln.policy import VlnAbout, VlnAgent, VlnMoment
+from embodied.agents.vln.policy import FollowerOutputs, VlnAbout, VlnAgent, VlnMoment
 from embodied.agents.vln.study import VlnLearner, losses_of, teacher_share
 from embodied.assistants.route_system import build_routes
 from embodied.datasets.store import dataset_of

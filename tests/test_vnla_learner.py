@@ -13,8 +13,8 @@ from hand_vnla import TINY, lesson, split_under
 
 from embodied.action_spaces import WORDS
 from embodied.agents.common import imitation
-from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.imitation import play_with_memory
+from embodied.agents.common.weights import CheckpointError
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vnla.agent import ASKED, LEARNED, TEACHER, VnlaAgent, rules_of
 from embodied.agents.vnla.config import TRAINED_UNDER

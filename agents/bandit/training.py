@@ -37,12 +37,11 @@ from embodied.agents.bandit.network import (
     tokenized,
 )
 from embodied.agents.bandit.ratings import CLEAN, Rater, corpus_bleu, sentence_bleu
-from embodied.agents.common.checkpoint import Stateful
-from embodied.agents.common.choosing import sampled_choice
 from embodied.agents.common.losses import Decisions, actor_loss, critic_loss
+from embodied.agents.common.rows import sampled_choice
 from embodied.agents.common.session import Note, Session, descend
 from embodied.agents.common.vocabulary import Vocabulary, most_frequent
-from embodied.agents.common.weights import weights_digest
+from embodied.agents.common.weights import Stateful, weights_digest
 from embodied.records import Identity, identity_of
 from embodied.seeds import stream
 

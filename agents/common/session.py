@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Self, TypedDict, TypeVar, Unpack
 
 import torch
 
-from embodied.agents.common.checkpoint import Stateful, restore, write_checkpoint
+from embodied.agents.common.weights import Stateful, restore, write_checkpoint
 from embodied.assets.cache import write_json
 from embodied.errors import UnableError
 from embodied.interface import Episode

@@ -15,8 +15,8 @@ import torch.nn.functional as F
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
-from embodied.agents.common.choosing import choose_sampled
 from embodied.agents.common.imitation import Supervised, play_with_memory
+from embodied.agents.common.rows import choose_sampled
 from embodied.agents.common.session import (
     Note,
     descend,

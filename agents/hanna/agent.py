@@ -1,29 +1,55 @@
 """HannaAgent: trained networks with all that is needed to act again; its variants by name, and what is counted of each.
-
 The playing itself is embodied.evaluation, the same for everybody.
+
+The training of HANNA: retrospective DAgger with the losses of 4.2.3, in the loop of agents.common.imitation; and
+what its commands do: a data set with features becomes a split, a split an agent.
+
+    episodes = play tasks with the sampling policies
+    labels = teacher.relabel(episodes)                        (`labelled`)
+    loss = L_main + L_ask  (4.9, 4.10, 4.13, 4.14)            (`imitation_loss`)
+
+The retrospective mode of 4.2.3: the learner acts alone until its episodes end, sampling from its
+own policies; then the teacher, who can now see each step's future, labels all steps at once. What
+the networks said while acting is kept with its gradients, so each step is computed once.
+
+N is any number of (episode, step) pairs, A the number of navigation actions. Each loss is one number per pair, zero
+where a label says that the step is not to be learned from.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Unpack
 
+import numpy as np
 import torch
+import torch.nn.functional as F
+from torch import Tensor
 
-from embodied.agents.common.choosing import choose_at
+from embodied.agents.common import imitation
+from embodied.agents.common.losses import IGNORE, negative_log_likelihood
+from embodied.agents.common.rows import choose_at
+from embodied.agents.common.session import Progress
 from embodied.agents.common.sighted import About, SightedAgent
+from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features
-from embodied.agents.hanna.inputs import Percept
+from embodied.agents.hanna.inputs import Percept, action_index
 from embodied.agents.hanna.lstm import LstmNetwork
 from embodied.agents.hanna.network import AgentNetwork, HannaNetwork, Scores
-from embodied.agents.hanna.policy import HannaMemory, HannaPolicy
+from embodied.agents.hanna.policy import HannaMemory, HannaPolicy, StepScores, for_training
 from embodied.agents.hanna.topological_map import MapPolicy, PerfectInterpretation
 from embodied.agents.hanna.training_config import RULES, HannaEvaluation, TrainingConfig, ask_patiently
 from embodied.agents.vision.features import FeatureBank
+from embodied.agents.vision.training_data import Split, TrainingData
+from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import agent as agent_without_learning
-from embodied.interface import Agent
+from embodied.interface import Agent, Episode, Place, Task, Teacher
+from embodied.records import identity_of
+from embodied.teachers.shortest import HannaTeacher
 
 NETWORKS: Mapping[str, type[AgentNetwork]] = {"hanna": HannaNetwork, "lstm": LstmNetwork}
 
@@ -120,3 +146,174 @@ def players(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     """All rows that an agent gives, beside agents without learning."""
     without = {name: agent_without_learning("hanna", name) for name in WITHOUT_LEARNING}
     return {**without, **hanna_policies(agent, bank)}
+
+
+@dataclass(frozen=True, eq=False)
+class Experience:
+    """Outputs of the networks in the N steps of a batch of finished episodes, in the order in which they were taken,
+    and what the teacher says of them."""
+
+    moves: Tensor
+    """(N, A) logits."""
+    asks: Tensor
+    """(N, 2) logits."""
+    reasons: Tensor | None
+    """(N, 3) logits."""
+    right_moves: Tensor
+    """(N,) int64 index of the reference action (0 is stop), IGNORE without one."""
+    negatives: Tensor
+    """(N, A) bool, past mistakes (4.12)."""
+    right_asks: Tensor
+    """(N,) int64, IGNORE where nobody could be asked."""
+    true_reasons: Tensor
+    """(N, 3) float32."""
+
+
+def labelled(
+    episodes: Sequence[Episode], moments: Sequence[StepScores], teacher: Teacher, worlds: Mapping[str, Place]
+) -> Experience:
+    """Outputs of the networks in some episodes, beside the teacher's labels; A is the most actions of any
+    step."""
+    labels = [teacher.relabel(e, worlds[e.task.world]) for e in episodes]
+    rows = [labels[position][t] for t, m in enumerate(moments) for position in m.positions]
+    scores = [m.scores for m in moments]
+    most, device = max(s.navigation.shape[1] for s in scores), scores[0].navigation.device
+    negatives = np.zeros((len(rows), most), dtype=bool)
+    for i, label in enumerate(rows):
+        for action in label.negatives:
+            negatives[i, action_index(action)] = True
+    reasons = [s.reasons for s in scores if s.reasons is not None]
+    true_reasons = np.array([r.reasons or (False, False, False) for r in rows], dtype=np.float32)
+    return Experience(
+        moves=torch.cat([F.pad(s.navigation, (0, most - s.navigation.shape[1]), value=-torch.inf) for s in scores]),
+        asks=torch.cat([s.ask for s in scores]),
+        reasons=torch.cat(reasons) if reasons else None,
+        right_moves=torch.tensor([IGNORE if r.move is None else action_index(r.move) for r in rows], device=device),
+        negatives=torch.from_numpy(negatives).to(device),
+        right_asks=torch.tensor([IGNORE if r.ask is None else int(r.ask) for r in rows], device=device),
+        true_reasons=torch.from_numpy(true_reasons).to(device),
+    )
+
+
+def imitation_loss(x: Experience, alpha: float, episodes: int, floor: float = 0.0) -> tuple[Tensor, Tensor]:
+    """Eqs 4.9 and 4.10: navigation and help-request losses, summed over steps, averaged over episodes.
+
+    `floor` as in `curiosity`.
+    """
+    navigation = navigation_loss(x.moves, x.right_moves, x.negatives, alpha, floor).sum() / episodes
+    asking = help_loss(x.asks, x.right_asks, x.reasons, x.true_reasons).sum() / episodes
+    return navigation, asking
+
+
+def curiosity(logits: Tensor, labels: Tensor, negatives: Tensor, floor: float = 0.0) -> Tensor:
+    """Mean log-likelihood of the mistakes made before in this situation: second term of Eq 4.13.
+
+    Args:
+      logits: (N, A).
+      labels: (N,) int64.
+      negatives: (N, A) bool, the set A^main-otimes of Eq 4.12.
+      floor: a mistake less likely than this is not pushed down any further; 0 is the equation as
+        printed, which has no lower bound: at learning rates above the authors' it runs away.
+
+    Returns:
+      (N,), zero where there are no mistakes.
+    """
+    log_p = logits.log_softmax(-1)
+    if floor > 0:
+        log_p = log_p.clamp(min=math.log(floor))
+    log_p = log_p.masked_fill(~negatives, 0.0)
+    mean = log_p.sum(-1) / negatives.sum(-1).clamp(min=1)
+    return mean * (labels != IGNORE)
+
+
+def navigation_loss(logits: Tensor, labels: Tensor, negatives: Tensor, alpha: float, floor: float = 0.0) -> Tensor:
+    """L_main of Eq 4.13, (N,); `floor` as in `curiosity`."""
+    loss = negative_log_likelihood(logits, labels)
+    return loss + alpha * curiosity(logits, labels, negatives, floor) if alpha else loss
+
+
+def reason_loss(logits: Tensor, reasons: Tensor, labels: Tensor) -> Tensor:
+    """Binary logistic loss of the three conditions, second term of Eq 4.14.
+
+    Args:
+      logits, reasons: (N, 3); reasons are 0 or 1.
+      labels: (N,) int64 of asking; IGNORE silences the reasons as well.
+
+    Returns:
+      (N,).
+    """
+    each = F.binary_cross_entropy_with_logits(logits, reasons, reduction="none")
+    return each.mean(-1) * (labels != IGNORE)
+
+
+def help_loss(ask: Tensor, labels: Tensor, reason_logits: Tensor | None, reasons: Tensor) -> Tensor:
+    """L_ask of Eq 4.14, (N,); without reason logits its first term only.
+
+    Args:
+      ask: (N, 2) logits of DO_NOTHING and REQUEST.
+      labels: (N,) int64, IGNORE outside the zones of attention.
+      reason_logits: (N, 3) or None.
+      reasons: (N, 3) float, 0 or 1.
+    """
+    loss = negative_log_likelihood(ask, labels)
+    return loss if reason_logits is None else loss + reason_loss(reason_logits, reasons, labels)
+
+
+class HannaLearner(imitation.ImitationLearner):
+    """A HANNA agent in training."""
+
+    def __init__(self, agent: HannaAgent, training: Split, teacher: Teacher) -> None:
+        super().__init__(agent, training)
+        config, self._teacher = agent.about.config, teacher
+        guided = config.guided_asking if config.ask_rule == "learned" else 0.0
+        self._player = for_training(
+            agent.policy(training.bank).policy, RULES[config.ask_rule][0], config.environment_dropout, guided
+        )
+
+    def training_task(self, task: Task) -> Task:
+        return dataclasses.replace(task, horizon=self.config.training_steps)
+
+    def evaluation_task(self, task: Task) -> Task:
+        return dataclasses.replace(task, horizon=self.evaluation.evaluation_steps)
+
+    def player(self, update: int, bank: FeatureBank) -> Agent:
+        return dataclasses.replace(self._player, bank=bank)
+
+    def experience(self, episodes: Sequence[Episode], memory: HannaMemory) -> Experience:
+        return labelled(episodes, memory.moments, self._teacher, self.training.worlds)
+
+    def loss_of(self, episodes: Sequence[Episode], experience: Experience) -> imitation.BatchLoss:
+        c, x = self.config, experience
+        losses = imitation_loss(x, c.alpha, c.batch, c.curiosity_floor)
+        known, askable = x.right_moves != IGNORE, x.right_asks != IGNORE
+        numbers = {
+            "right moves": float((x.moves.argmax(-1) == x.right_moves)[known].float().mean()),
+            **imitation.played(episodes, self.training.worlds),
+            **imitation.asked(episodes, x.asks[askable], x.right_asks[askable]),
+        }
+        return imitation.BatchLoss(losses, losses[0] + losses[1] if c.ask_rule == "learned" else losses[0], numbers)
+
+
+def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
+    """Words of the training split's first `houses` houses: requests and the routes that training hears."""
+    names = data.names("train")[:houses]
+    routes = [r.instruction for n in names for r in data.routes(n) if r.split == "train_seen"]
+    return build_vocabulary([*(t.request for t in data.tasks("train") if t.world in names), *routes], 2)
+
+
+def train_agent(
+    source: TrainingData,
+    config: TrainingConfig,
+    evaluation: HannaEvaluation,
+    folder: Path,
+    **options: Unpack[imitation.Options],
+) -> Progress:
+    """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
+    houses = config.training_houses or None
+    training = source.split("train", houses=houses)
+    validation = source.split("val_unseen", limit=config.validation_tasks)
+    words = vocabulary_of(source.data, houses)
+    agent = HannaAgent.new(source.about(HannaAbout, config, evaluation, words))
+    agent.network.to(source.device)
+    identity = identity_of("embodied.agents.hanna.agent", settings=config, **source.identity())
+    return imitation.train(HannaLearner(agent, training, HannaTeacher()), validation, folder, identity, **options)

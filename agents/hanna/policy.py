@@ -11,8 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from embodied.agents.common.choosing import Chooser, choose_greedily, choose_sampled
-from embodied.agents.common.rows import RunningRows, hidden_channels
+from embodied.agents.common.rows import Chooser, RunningRows, choose_greedily, choose_sampled, hidden_channels
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.hanna.inputs import (
     COPIES,

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from embodied.agents.common.session import Note
-from embodied.agents.hanna.agent import HannaAgent, by_the_text, hanna_policies
-from embodied.agents.hanna.run import train_agent
+from embodied.agents.hanna.agent import HannaAgent, by_the_text, hanna_policies, train_agent
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
@@ -121,7 +120,7 @@ class HannaStudy(SightedStudy):
     device: str = "cpu"
 
     name, agent_kind = "hanna", HannaAgent
-    makers = ("embodied.agents.hanna.run",)
+    makers = ("embodied.agents.hanna.agent",)
     judges = (*JUDGES, "embodied.agents.hanna.agent")
 
     def tables(self) -> Mapping[str, StudyTable]:

@@ -13,8 +13,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from embodied.agents.hari.agent import Executor, HariAgent
-from embodied.agents.hari.networks import INTENTIONS, EncodedDescriptions, RecurrentHead, shown_probabilities
+from embodied.agents.hari.networks import (
+    INTENTIONS,
+    EncodedDescriptions,
+    Executor,
+    HariAgent,
+    RecurrentHead,
+    shown_probabilities,
+)
 from embodied.agents.hari.words import collate, percept_of_rows
 from embodied.interface import (
     Action,

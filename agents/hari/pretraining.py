@@ -21,7 +21,6 @@ import torch
 from torch import Tensor
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.session import (
     Options,
     Progress,
@@ -32,9 +31,9 @@ from embodied.agents.common.session import (
     set_learning_rate,
     tasks_of_update,
 )
-from embodied.agents.hari.agent import Executor, save
+from embodied.agents.common.weights import Stateful
 from embodied.agents.hari.config import ExecutionConfig
-from embodied.agents.hari.networks import EncodedDescriptions
+from embodied.agents.hari.networks import EncodedDescriptions, Executor, save
 from embodied.agents.hari.words import collate, padded, percept
 from embodied.assistants.descriptions import Describer, dropped
 from embodied.interface import Description, Episode, FindObject, Move, Place, Pose, Task

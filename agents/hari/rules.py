@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from embodied.agents.hari.agent import Executor, HariAgent
-from embodied.agents.hari.networks import INTENTIONS
+from embodied.agents.hari.networks import INTENTIONS, Executor, HariAgent
 from embodied.agents.hari.policy import ASKS, DO, DONE, Belief, Reader, action_of, available, carry, consider, policy_of
 from embodied.interface import Actions, Agent, Observations, Rngs
 

@@ -21,14 +21,21 @@ from typing import Any, Unpack
 import torch
 from torch import Tensor
 
-from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.imitation import TaskSet
 from embodied.agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.session import Options, Progress, Session, descend, episode_seed, run, tasks_of_update
-from embodied.agents.common.weights import checksum_of, load_into, weights_digest
-from embodied.agents.hari.agent import Executor, HariAgent, load_executor, new_executor, new_heads, save
+from embodied.agents.common.weights import Stateful, checksum_of, load_into, weights_digest
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
-from embodied.agents.hari.networks import INTENTIONS, RecurrentHead
+from embodied.agents.hari.networks import (
+    INTENTIONS,
+    Executor,
+    HariAgent,
+    RecurrentHead,
+    load_executor,
+    new_executor,
+    new_heads,
+    save,
+)
 from embodied.agents.hari.policy import Choice, policy_of
 from embodied.agents.hari.pretraining import PretrainingData, pretrain
 from embodied.agents.hari.words import feature_words

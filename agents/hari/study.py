@@ -10,9 +10,8 @@ from typing import Any
 
 from embodied.agents.common.session import Note
 from embodied.agents.common.weights import weights_digest
-from embodied.agents.hari.agent import HariAgent, load_agent, load_executor
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
-from embodied.agents.hari.networks import INTENTIONS
+from embodied.agents.hari.networks import INTENTIONS, HariAgent, load_agent, load_executor
 from embodied.agents.hari.rules import GREEDY, RANDOM, policies
 from embodied.agents.hari.run import (
     TEST,

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from embodied.agents.common.checkpoint import read_checkpoint
 from embodied.agents.common.session import Note
+from embodied.agents.common.weights import read_checkpoint
 from embodied.agents.iliad.config import LearnerConfig
 from embodied.agents.iliad.nav.run import NavSetup
 from embodied.agents.iliad.regex.run import RegexSetup

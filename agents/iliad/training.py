@@ -14,9 +14,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate, tasks_of_update
-from embodied.agents.common.weights import load_into, origin_of, read_weights, save_weights
+from embodied.agents.common.weights import Stateful, load_into, origin_of, read_weights, save_weights
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
 from embodied.agents.iliad.protocol import (
     DescribingTeacher,

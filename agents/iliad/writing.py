@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from embodied.agents.common.choosing import Choice
-from embodied.agents.common.rows import Rows
+from embodied.agents.common.rows import Choice, Rows
 
 PAD = 0
 

@@ -52,7 +52,7 @@ class HannaStudyOptions(EpisodeStudyOptions, Encoded, WithDevice):
 
 
 def train(args: HannaTraining, **session: Any) -> None:
-    from embodied.agents.hanna.run import train_agent
+    from embodied.agents.hanna.agent import train_agent
 
     source = training_data(args, "hanna", args.device)
     session["minutes"] = args.minutes

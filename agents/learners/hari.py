@@ -61,7 +61,7 @@ def execution(args: ExecutionTraining, *, note: Note) -> None:
 
 
 def intention(args: IntentionTraining, **session: Any) -> None:
-    from embodied.agents.hari.agent import load_executor
+    from embodied.agents.hari.networks import load_executor
     from embodied.agents.hari.run import train_intention
     from embodied.datasets.store import dataset_of
 
@@ -79,7 +79,7 @@ def study(args: HariStudyOptions) -> StudyLearner:
 
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """Rows of Table 4.7 for one agent, in the environment that it was trained for."""
-    from embodied.agents.hari.agent import load_agent
+    from embodied.agents.hari.networks import load_agent
     from embodied.agents.hari.rules import policies
     from embodied.agents.hari.run import rules_of, validation_means
 

@@ -21,10 +21,9 @@ from typing import Any, ClassVar
 
 import joblib
 
-from embodied.agents.common.checkpoint import read_checkpoint
 from embodied.agents.common.parallel import use_threads
 from embodied.agents.common.session import Note
-from embodied.agents.common.weights import weights_digest
+from embodied.agents.common.weights import read_checkpoint, weights_digest
 from embodied.agents.studies.tables import StudyRow, StudyTable, draw, page
 from embodied.assets.cache import digest, write_bytes, write_json
 from embodied.evaluation.tables import Samples, in_percent, interval, less

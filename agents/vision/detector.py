@@ -24,8 +24,7 @@ from embodied.agents.common.shipped import SHIPPED_DETECTOR
 from embodied.agents.common.weights import half_precision, load_into, load_weights, save_weights, seeded
 from embodied.agents.vision.config import StripTraining
 from embodied.agents.vision.encoder import STRIP_COLUMNS, Encoder, cell_direction, inside_windows, pool_views
-from embodied.agents.vision.features import strip_of
-from embodied.agents.vision.labels import SHELL, HouseStrips, visible_in_views
+from embodied.agents.vision.features import SHELL, HouseStrips, strip_of, visible_in_views
 from embodied.agents.vision.training import StripBatch, classes_of, learn
 from embodied.records import Identity, identity_of
 from embodied.render.panorama import Panorama, Recognised

@@ -21,14 +21,16 @@ from embodied.agents.vision.config import LATER_CAMERA, RENDER_PRESETS, SAME_TIM
 from embodied.agents.vision.encoder import Encoder
 from embodied.agents.vision.features import (
     EQUIRECT,
+    HouseStrips,
+    all_classes,
     encode_strips,
     feature_path,
     has_features,
     load_features,
+    look,
     margin,
     save_features,
 )
-from embodied.agents.vision.labels import HouseStrips, all_classes, look
 from embodied.assets.cache import digest, write_json
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import code_digest

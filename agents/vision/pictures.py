@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from embodied.agents.vision.labels import VISIBLE, ids_to_labels
+from embodied.agents.vision.features import VISIBLE, ids_to_labels
 from embodied.assets.records import ROOM_KINDS
 from embodied.datasets.store import Dataset
 from embodied.gym.playground import pictures_of

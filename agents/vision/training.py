@@ -21,9 +21,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.session import Note, Session, descend
-from embodied.agents.common.weights import seeded
+from embodied.agents.common.weights import Stateful, seeded
 from embodied.agents.vision.config import StripTraining, VisionConfig
 from embodied.agents.vision.encoder import (
     CELL,
@@ -35,7 +34,7 @@ from embodied.agents.vision.encoder import (
     strip_map,
     whitening,
 )
-from embodied.agents.vision.labels import HouseStrips, visible_in_views
+from embodied.agents.vision.features import HouseStrips, visible_in_views
 from embodied.agents.vision.lite import Lite, load_imagenet
 from embodied.assets.cache import digest
 from embodied.assets.records import ROOM_KINDS

@@ -18,8 +18,8 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from embodied.agents.common import imitation
-from embodied.agents.common.choosing import choose_sampled
 from embodied.agents.common.losses import IGNORE, negative_log_likelihood
+from embodied.agents.common.rows import choose_sampled
 from embodied.agents.common.session import Note, Progress
 from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.vocabulary import build_vocabulary

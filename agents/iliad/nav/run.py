@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from torch import Tensor
 
-from embodied.agents.common.choosing import greedy_choice
+from embodied.agents.common.rows import greedy_choice
 from embodied.agents.common.session import Note
 from embodied.agents.common.vocabulary import build_vocabulary, use_vectors, vocabulary_with
 from embodied.agents.common.weights import load_into, load_weights, save_weights, seeded
@@ -34,7 +34,7 @@ from embodied.agents.iliad.writing import likelihood_loss
 from embodied.agents.vision.extract import drawings_of, house_features
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vln.config import FollowerSettings
-from embodied.agents.vln.network import FollowerNetwork
+from embodied.agents.vln.policy import FollowerNetwork
 from embodied.agents.vln.study import more_routes
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset, dataset_of

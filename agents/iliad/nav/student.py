@@ -13,15 +13,15 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.agents.common.choosing import Choice, greedy_choice, sampled_choice
 from embodied.agents.common.losses import IGNORE, negative_log_likelihood
+from embodied.agents.common.rows import Choice, greedy_choice, sampled_choice
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.hanna.inputs import orientation
 from embodied.agents.iliad.config import NavConfig
 from embodied.agents.iliad.nav.world import MOVES, NavWalk, Trip, share_left, walk_along, without_loops
 from embodied.agents.iliad.protocol import ExecutionScores
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vln.network import COPIES, FollowerNetwork, FollowerOutputs, FollowerViews
+from embodied.agents.vln.policy import COPIES, FollowerNetwork, FollowerOutputs, FollowerViews
 from embodied.assets.cache import digest
 from embodied.assets.records import ROOM_KINDS
 from embodied.datasets.store import Dataset

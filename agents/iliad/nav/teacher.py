@@ -1,6 +1,6 @@
 """Who describes walks: a describer with an executor (3.2.4.1), or the people who word routes here.
 
-The describer of NAV (Figure C.4) reads a walk and writes; who follows is agents.vln.network's follower. B walks, T
+The describer of NAV (Figure C.4) reads a walk and writes; who follows is agents.vln.policy's follower. B walks, T
 steps, E size of a view's features and direction, h hidden size.
 """
 
@@ -13,7 +13,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from embodied.agents.common.choosing import Choice, greedy_choice, sampled_choice
+from embodied.agents.common.rows import Choice, greedy_choice, sampled_choice
 from embodied.agents.common.vocabulary import END_NUMBER, Vocabulary
 from embodied.agents.hanna.attention import DotAttend, FeedForward, MultiAttend
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent, Track
