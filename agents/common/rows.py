@@ -1,5 +1,5 @@
-"""Records of tensors of which each row belongs to one agent, or sentence, of a batch; and how an action is chosen from a
-distribution, and words, characters or actions of a batch from logits: the likeliest, or sampled."""
+"""Records of tensors of which each row belongs to one agent, or sentence, of a batch; and how an action is chosen
+from a distribution, and words, characters or actions of a batch from logits: the likeliest, or sampled."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""HARI's networks: the execution policy (a Transformer), the intention policy and its critic (LSTMs); appendix E. HARI's
-agents on disk: the execution policy alone, or with the intention policy that learned to use it."""
+"""HARI's networks: the execution policy (a Transformer), the intention policy and its critic (LSTMs); appendix E.
+HARI's agents on disk: the execution policy alone, or with the intention policy that learned to use it."""
 
 from __future__ import annotations
 
