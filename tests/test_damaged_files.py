@@ -41,10 +41,7 @@ from embodied.agents.hari import networks as hari
 from embodied.agents.iliad.nav.run import load_follower
 from embodied.agents.iliad.regex.run import load_student
 from embodied.agents.vision.config import PLAIN
-from embodied.agents.vision.features import load_features, save_features
-from embodied.agents.vision.labels import HouseStrips
 from embodied.agents.vision.features import HouseStrips, load_features, save_features
-from embodied.assets.archives import open_arrays, read_picture
 from embodied.assets.closure import ROOT
 from embodied.assets.decoding import load_record, open_arrays, read_picture, save_record
 from embodied.assets.importing.own import import_own, read_own

@@ -22,8 +22,8 @@ import torch
 from embodied.agents.common.weights import load_tensors, save_tensors
 from embodied.agents.vision.config import PLAIN, drawing
 from embodied.agents.vision.encoder import CELL, HEIGHT, STRIP_COLUMNS, STRIP_ROWS, WIDTH, Encoder, windows
-from embodied.assets.archives import open_arrays
 from embodied.assets.cache import DAMAGED, atomic_path
+from embodied.assets.decoding import open_arrays
 from embodied.assets.records import ROOM_KINDS
 from embodied.gym.semantic_features import SightRows
 from embodied.house.house import OPENING_KINDS, House
