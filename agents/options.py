@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import pkgutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.agents.common.shipped import SHIPPED_ENCODER
+from embodied.agents.common.settings import SHIPPED_ENCODER
 from embodied.agents.vision.config import RENDER_PRESETS
 from embodied.options import (
     PICTURE_HELP,
@@ -127,6 +129,17 @@ def training_data(args: Any, kind: str, device: str = "cpu") -> TrainingData:
     return TrainingData(data, encoder, args.pictures, device, cache=args.cache)
 
 
+def training(function: str, kind: str) -> Callable[..., None]:
+    """`embodied train` of agents that see features: by `module:function`, on a data set of a kind of task."""
+
+    def train(args: Any, **session: Any) -> None:
+        source = training_data(args, kind, args.device)
+        how = {"minutes": args.minutes, **session}
+        pkgutil.resolve_name(function)(source, args.config, args.evaluation, args.out, **how)
+
+    return train
+
+
 # Studies ------------------------------------------------------------------------------------------
 
 Tables = Annotated[tuple[str, ...], Option(metavar="TABLE", name="TABLE")]
@@ -162,6 +175,11 @@ class Limited:
 @dataclass(frozen=True, kw_only=True)
 class EpisodeStudyOptions(StudyOptions, Repeated, Limited, WithData, Scaled):
     """Options of studies whose agents play episodes."""
+
+
+def study_by(name: str) -> Callable[[Any], Any]:
+    """`embodied study` by `module:Class`: see `study_of`."""
+    return lambda args: study_of(pkgutil.resolve_name(name), args)
 
 
 def study_of(kind: Any, args: Any, **more: Any) -> Any:

@@ -43,7 +43,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from embodied.action_spaces import MonocularMoves
-from embodied.agents.common.shipped import SHIPPED_ENCODER
+from embodied.agents.common.settings import SHIPPED_ENCODER
 from embodied.agents.common.weights import seeded
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import encode_panoramas, look, visible_in_views

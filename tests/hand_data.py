@@ -16,7 +16,7 @@ from conftest import two_rooms
 from hand_worlds import grid_world, thing
 from handmade import HandCatalogue, furnished
 
-from embodied.agents.common.shipped import WEIGHTS
+from embodied.agents.common.settings import WEIGHTS
 from embodied.datasets.build import DatasetConfig, build_dataset, units
 from embodied.datasets.store import Dataset
 from embodied.kinds.plugins import shipped_kinds

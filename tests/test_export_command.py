@@ -13,7 +13,7 @@ from hand_data import boxes_house, build, built, live_among_boxes, read_features
 from handmade import HandCatalogue, furnished
 
 from embodied import cli
-from embodied.agents.common.shipped import SHIPPED_ENCODER
+from embodied.agents.common.settings import SHIPPED_ENCODER
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import feature_path, save_features
 from embodied.cli import export, exports

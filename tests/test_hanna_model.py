@@ -9,14 +9,18 @@ import numpy as np
 import pytest
 import torch
 
-from embodied.agents.hanna.attention import DotAttend, IncTime, MultiAttend, sim_attend, sinusoid
-from embodied.agents.hanna.inputs import (
+from embodied.agents.hanna.attention import (
     DO_NOTHING,
     REQUEST,
     SLOTS,
     START,
+    DotAttend,
+    IncTime,
+    MultiAttend,
     Percept,
     action_size,
+    sim_attend,
+    sinusoid,
     slot_distribution,
     target_similarity,
 )

@@ -8,7 +8,7 @@ import pytest
 import torch
 from hand_worlds import grid_world
 
-from embodied.agents.common.shipped import SHIPPED_HARI, WEIGHTS
+from embodied.agents.common.settings import SHIPPED_HARI, WEIGHTS
 from embodied.agents.common.weights import origin_of
 from embodied.agents.hari.networks import HariAgent, load_agent
 from embodied.agents.hari.policy import policy_of

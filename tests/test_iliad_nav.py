@@ -9,7 +9,7 @@ from hand_worlds import grid_world, line_world
 
 from embodied.agents.common.rows import greedy_choice
 from embodied.agents.common.vocabulary import build_vocabulary
-from embodied.agents.hanna.inputs import orientation
+from embodied.agents.hanna.attention import orientation
 from embodied.agents.iliad.config import LearnerConfig, NavConfig
 from embodied.agents.iliad.nav.run import new_follower
 from embodied.agents.iliad.nav.student import LoopFree, NavEyes, NavStudent, Track

@@ -7,7 +7,7 @@ import pytest
 from hand_worlds import grid_world
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_WALKER
+from embodied.agents.common.settings import SHIPPED_ENCODER, SHIPPED_WALKER
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.iliad.nav.run import load_follower
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent

@@ -13,7 +13,7 @@ import torch
 from hand_data import COMPACT, built, noise_features, random_encoder, small_house, validations_of
 
 from embodied import options
-from embodied.agents.common.shipped import SHIPPED_AGENT, WEIGHTS
+from embodied.agents.common.settings import SHIPPED_AGENT, WEIGHTS
 from embodied.agents.common.weights import origin_of, weights_digest
 from embodied.agents.hanna.agent import HannaAbout, HannaAgent, hanna_policies, train_agent, vocabulary_of
 from embodied.agents.hanna.study import HannaStudy

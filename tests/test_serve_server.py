@@ -18,7 +18,7 @@ from hand_serve import TOGETHER, Human, Served, make_data, pair, write_study
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from embodied.agents.common.shipped import SHIPPED_ENCODER
+from embodied.agents.common.settings import SHIPPED_ENCODER
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import feature_path, save_features
 from embodied.cli.serve import agents_of

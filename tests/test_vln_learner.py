@@ -12,7 +12,7 @@ from hand_data import built
 from hand_worlds import grid_world
 
 from embodied.agents.common.losses import IGNORE
-from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VLN
+from embodied.agents.common.settings import SHIPPED_ENCODER, SHIPPED_VLN
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import FeatureBank

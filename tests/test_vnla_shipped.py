@@ -8,7 +8,7 @@ import torch
 from hand_vnla import tasks_of
 from hand_worlds import grid_world
 
-from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VNLA
+from embodied.agents.common.settings import SHIPPED_ENCODER, SHIPPED_VNLA
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vnla.agent import LEARNED, VnlaAgent

@@ -1,6 +1,8 @@
-"""Settings that all learners share, and checks of settings. Free of torch, so that --help answers at once.
+"""Settings that all learners share, checks of settings, and paths of the weights that ship with this repository. Free of
+torch, so that --help answers at once.
 
 A learner's settings are a frozen record over one of these; a field that stands there again has a default of its own.
+agents/weights/README.md says how the weights were made.
 """
 
 from __future__ import annotations
@@ -8,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -131,3 +134,13 @@ class EvaluationSettings:
     def __post_init__(self) -> None:
         require(self, NOT_NEGATIVE, "evaluation_temperature")
         require(self, SHARE, "ask_threshold")
+
+
+WEIGHTS = Path(__file__).resolve().parent.parent / "weights"
+SHIPPED_ENCODER, SHIPPED_AGENT = WEIGHTS / "encoder.safetensors", WEIGHTS / "hanna_mini.safetensors"
+SHIPPED_DETECTOR = WEIGHTS / "detector.safetensors"
+"""Of the shipped encoder."""
+SHIPPED_HARI = WEIGHTS / "hari_mini.safetensors"
+SHIPPED_VNLA, SHIPPED_VLN = WEIGHTS / "vnla_mini.safetensors", WEIGHTS / "vln_mini.safetensors"
+SHIPPED_STUDENT = WEIGHTS / "iliad_regex_tiny.safetensors"
+SHIPPED_WALKER = WEIGHTS / "iliad_nav_mini.safetensors"

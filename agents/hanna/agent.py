@@ -37,7 +37,7 @@ from embodied.agents.common.session import Progress
 from embodied.agents.common.sighted import About, SightedAgent
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features
-from embodied.agents.hanna.inputs import Percept, action_index
+from embodied.agents.hanna.attention import Percept, action_index
 from embodied.agents.hanna.lstm import LstmNetwork
 from embodied.agents.hanna.network import AgentNetwork, HannaNetwork, Scores
 from embodied.agents.hanna.policy import HannaMemory, HannaPolicy, StepScores, for_training

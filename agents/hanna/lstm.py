@@ -13,8 +13,7 @@ from torch import Tensor, nn
 
 from embodied.agents.common.rows import Rows
 from embodied.agents.common.vocabulary import WordEmbedding
-from embodied.agents.hanna.attention import DotAttend
-from embodied.agents.hanna.inputs import SLOTS, VIEWS, Percept, action_size
+from embodied.agents.hanna.attention import SLOTS, VIEWS, DotAttend, Percept, action_size
 from embodied.agents.hanna.network import AgentNetwork
 from embodied.agents.hanna.training_config import TrainingConfig
 

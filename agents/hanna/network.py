@@ -23,20 +23,18 @@ from torch import Tensor, nn
 
 from embodied.agents.common.rows import Rows
 from embodied.agents.hanna.attention import (
+    REQUEST,
+    SLOTS,
+    VIEWS,
     DotAttend,
     FeedForward,
     IncTime,
     MultiAttend,
+    Percept,
     SelfAttend,
     TextEncoder,
-    sim_attend,
-)
-from embodied.agents.hanna.inputs import (
-    REQUEST,
-    SLOTS,
-    VIEWS,
-    Percept,
     action_size,
+    sim_attend,
     slot_distribution,
     target_similarity,
 )

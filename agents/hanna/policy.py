@@ -13,7 +13,7 @@ from torch import Tensor
 
 from embodied.agents.common.rows import Chooser, RunningRows, choose_greedily, choose_sampled, hidden_channels
 from embodied.agents.common.vocabulary import Vocabulary
-from embodied.agents.hanna.inputs import (
+from embodied.agents.hanna.attention import (
     COPIES,
     DO_NOTHING,
     HEADINGS,

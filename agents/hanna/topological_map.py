@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from embodied.agents.hanna.inputs import HEADINGS, VIEWS, action_index
+from embodied.agents.hanna.attention import HEADINGS, VIEWS, action_index
 from embodied.agents.hanna.policy import HannaMemory, HannaPolicy, Steering, unsteered
 from embodied.interface import Action, Actions, Mode, Move, Observation, Observations, Rngs, Situations
 from embodied.teachers.shortest import shortest_of

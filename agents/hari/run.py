@@ -124,11 +124,8 @@ def train_step(run: IntentionRun, ground: TaskSet, update: int) -> dict[str, flo
 
 def padded(rows: Sequence[Sequence[float]]) -> tuple[Tensor, Tensor]:
     """(B, T) float32 of rows of unequal length, zero behind their ends, and (B, T) bool: where there is something."""
-    out = torch.zeros(len(rows), max(map(len, rows)))
-    mask = torch.zeros(out.shape, dtype=torch.bool)
-    for i, r in enumerate(rows):
-        out[i, : len(r)], mask[i, : len(r)] = torch.tensor(r), True
-    return out, mask
+    out = torch.nn.utils.rnn.pad_sequence([torch.tensor(r) for r in rows], batch_first=True)
+    return out, torch.arange(out.shape[1]) < torch.tensor([len(r) for r in rows])[:, None]
 
 
 def chosen(choices: Sequence[Choice], batch: int) -> tuple[Tensor, Tensor]:

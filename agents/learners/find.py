@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from embodied.agents.find.config import FinderConfig
 from embodied.agents.learner import Learner, register_learner
-from embodied.agents.options import TRAINING, Encoded, Repeated, StudyOptions, WithData, study_of
+from embodied.agents.options import TRAINING, Encoded, Repeated, StudyOptions, WithData, study_by
 from embodied.options import Count, Settings
-
-if TYPE_CHECKING:
-    from embodied.agents.studies.engine import StudyLearner
 
 WORDLESS = ("instruction_length", "word_vectors")
 """Of the settings of agents, those that an agent that is told a class has no use for."""
@@ -26,10 +23,4 @@ class FindStudyOptions(StudyOptions, Repeated, WithData, Encoded):
     config: Annotated[FinderConfig, Settings(TRAINING, FinderConfig(), skip=WORDLESS)]
 
 
-def study(args: FindStudyOptions) -> StudyLearner:
-    from embodied.agents.find.study import FindStudy
-
-    return study_of(FindStudy, args)
-
-
-register_learner(Learner(name="find", study=(FindStudyOptions, study)))
+register_learner(Learner(name="find", study=(FindStudyOptions, study_by("embodied.agents.find.study:FindStudy"))))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-from embodied.agents.common.shipped import SHIPPED_AGENT
+from embodied.agents.common.settings import SHIPPED_AGENT
 from embodied.agents.hanna.training_config import EVALUATIONS, HANNA_SCALES, HannaEvaluation, TrainingConfig
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
 from embodied.agents.options import (
@@ -18,13 +18,12 @@ from embodied.agents.options import (
     SightedRun,
     Tables,
     WithDevice,
-    study_of,
-    training_data,
+    study_by,
+    training,
 )
 from embodied.options import Count, Settings
 
 if TYPE_CHECKING:
-    from embodied.agents.studies.engine import StudyLearner
     from embodied.datasets.store import Dataset
 
 
@@ -51,20 +50,6 @@ class HannaStudyOptions(EpisodeStudyOptions, Encoded, WithDevice):
     evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
 
 
-def train(args: HannaTraining, **session: Any) -> None:
-    from embodied.agents.hanna.agent import train_agent
-
-    source = training_data(args, "hanna", args.device)
-    session["minutes"] = args.minutes
-    train_agent(source, args.config, args.evaluation, args.out, **session)
-
-
-def study(args: HannaStudyOptions) -> StudyLearner:
-    from embodied.agents.hanna.study import HannaStudy
-
-    return study_of(HannaStudy, args)
-
-
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """Tables 4.3 to 4.5."""
     from embodied.agents.hanna.agent import WITHOUT_LEARNING, HannaAgent, players
@@ -82,8 +67,8 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
 register_learner(
     Learner(
         name="hanna",
-        train=(HannaTraining, train),
-        study=(HannaStudyOptions, study),
+        train=(HannaTraining, training("embodied.agents.hanna.agent:train_agent", "hanna")),
+        study=(HannaStudyOptions, study_by("embodied.agents.hanna.study:HannaStudy")),
         players=players,
         columns=(
             *("success", "strict success", "spl", "navigation error", "requests"),

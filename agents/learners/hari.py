@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.agents.common.shipped import SHIPPED_HARI
+from embodied.agents.common.settings import SHIPPED_HARI
 from embodied.agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, ExecutionConfig, IntentionConfig
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
 from embodied.agents.options import TRAINING, Drawn, EpisodeStudyOptions, Recorded, Run, Seeds, Tables, study_of

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-from embodied.agents.common.settings import EvaluationSettings
-from embodied.agents.common.shipped import SHIPPED_VLN
+from embodied.agents.common.settings import SHIPPED_VLN, EvaluationSettings
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
 from embodied.agents.options import (
     EVALUATION,
@@ -16,14 +15,13 @@ from embodied.agents.options import (
     EpisodeStudyOptions,
     SightedRun,
     Tables,
-    study_of,
-    training_data,
+    study_by,
+    training,
 )
 from embodied.agents.vln.config import FORCING, MEASURES, VLN_SCALES, FollowerSettings
 from embodied.options import Count, Settings
 
 if TYPE_CHECKING:
-    from embodied.agents.studies.engine import StudyLearner
     from embodied.datasets.store import Dataset
 
 
@@ -47,19 +45,6 @@ class VlnStudyOptions(EpisodeStudyOptions, Encoded):
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings(), skip=("ask_threshold",))]
 
 
-def follower(args: FollowerTraining, **session: Any) -> None:
-    from embodied.agents.vln.study import train_follower
-
-    source = training_data(args, "vln", args.device)
-    train_follower(source, args.config, args.evaluation, args.out, minutes=args.minutes, **session)
-
-
-def study(args: VlnStudyOptions) -> StudyLearner:
-    from embodied.agents.vln.study import VlnStudy
-
-    return study_of(VlnStudy, args)
-
-
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """The follower beside agents without learning."""
     from embodied.agents.vision.training_data import evaluation_data
@@ -79,8 +64,11 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
 register_learner(
     Learner(
         name="vln",
-        train=("Agents that follow route instructions.", {"follower": (FollowerTraining, follower)}),
-        study=(VlnStudyOptions, study),
+        train=(
+            "Agents that follow route instructions.",
+            {"follower": (FollowerTraining, training("embodied.agents.vln.study:train_follower", "vln"))},
+        ),
+        study=(VlnStudyOptions, study_by("embodied.agents.vln.study:VlnStudy")),
         players=players,
         columns=MEASURES,
         shipped=SHIPPED_VLN,

@@ -5,10 +5,9 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-from embodied.agents.common.settings import EvaluationSettings
-from embodied.agents.common.shipped import SHIPPED_VNLA
+from embodied.agents.common.settings import SHIPPED_VNLA, EvaluationSettings
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
 from embodied.agents.options import (
     EVALUATION,
@@ -17,14 +16,13 @@ from embodied.agents.options import (
     EpisodeStudyOptions,
     SightedRun,
     Tables,
-    study_of,
-    training_data,
+    study_by,
+    training,
 )
 from embodied.agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VNLA_SCALES, VnlaSettings
 from embodied.options import Count, Settings
 
 if TYPE_CHECKING:
-    from embodied.agents.studies.engine import StudyLearner
     from embodied.datasets.store import Dataset
 
 
@@ -57,19 +55,6 @@ class VnlaStudyOptions(EpisodeStudyOptions, Encoded):
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
 
 
-def train(args: VnlaTraining, **session: Any) -> None:
-    from embodied.agents.vnla.run import train_agent
-
-    source = training_data(args, "vnla", args.device)
-    train_agent(source, args.config, args.evaluation, args.out, minutes=args.minutes, **session)
-
-
-def study(args: VnlaStudyOptions) -> StudyLearner:
-    from embodied.agents.vnla.study import VnlaStudy
-
-    return study_of(VnlaStudy, args)
-
-
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """The learned asker beside other askers, direct intervention and agents without learning."""
     from embodied.agents.vision.training_data import evaluation_data
@@ -91,8 +76,8 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
 register_learner(
     Learner(
         name="vnla",
-        train=(VnlaTraining, train),
-        study=(VnlaStudyOptions, study),
+        train=(VnlaTraining, training("embodied.agents.vnla.run:train_agent", "vnla")),
+        study=(VnlaStudyOptions, study_by("embodied.agents.vnla.study:VnlaStudy")),
         players=players,
         columns=(
             *("success", "strict success", "room success", "navigation error"),

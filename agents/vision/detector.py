@@ -20,7 +20,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from embodied.agents.common.session import Note
-from embodied.agents.common.shipped import SHIPPED_DETECTOR
+from embodied.agents.common.settings import SHIPPED_DETECTOR
 from embodied.agents.common.weights import half_precision, load_into, load_weights, save_weights, seeded
 from embodied.agents.vision.config import StripTraining
 from embodied.agents.vision.encoder import STRIP_COLUMNS, Encoder, cell_direction, inside_windows, pool_views

@@ -26,7 +26,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from embodied.agents.common.shipped import SHIPPED_ENCODER
+from embodied.agents.common.settings import SHIPPED_ENCODER
 from embodied.agents.common.weights import load_into, load_weights, save_weights
 from embodied.agents.vision.lite import COMPACT, LITE, Compact, Lite, folded
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.agents.common.shipped import SHIPPED_ENCODER
+from embodied.agents.common.settings import SHIPPED_ENCODER
 from embodied.agents.vision.encoder import Encoder, load_encoder
 from embodied.agents.vision.features import encode_panoramas
 from embodied.gym.sensors import PanoramaStore

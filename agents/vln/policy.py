@@ -20,8 +20,7 @@ from embodied.agents.common.rows import Chooser, Rows, RunningRows, choose_at, c
 from embodied.agents.common.sighted import About, SightedAgent
 from embodied.agents.common.vocabulary import Vocabulary, WordEmbedding
 from embodied.agents.common.weights import check_features
-from embodied.agents.hanna.attention import DotAttend
-from embodied.agents.hanna.inputs import action_index, candidate_rows, orientation
+from embodied.agents.hanna.attention import DotAttend, action_index, candidate_rows, orientation
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vln.config import FollowerSettings
 from embodied.assets.records import ROOM_KINDS

@@ -157,7 +157,7 @@ def find_something(args: DemoOptions, world: World) -> dict:
 def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route]) -> dict:
     """The trained agent, seeing the world's own pictures, does a HANNA task in a house it has never seen; recorded to
     help.rrd."""
-    from embodied.agents.common.shipped import SHIPPED_AGENT
+    from embodied.agents.common.settings import SHIPPED_AGENT
     from embodied.agents.hanna.agent import HannaAgent, hanna_policies
     from embodied.agents.vision.detector import Detector
     from embodied.agents.vision.encoder import load_encoder

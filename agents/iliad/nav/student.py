@@ -16,7 +16,7 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common.losses import IGNORE, negative_log_likelihood
 from embodied.agents.common.rows import Choice, greedy_choice, sampled_choice
 from embodied.agents.common.vocabulary import Vocabulary
-from embodied.agents.hanna.inputs import orientation
+from embodied.agents.hanna.attention import orientation
 from embodied.agents.iliad.config import NavConfig
 from embodied.agents.iliad.nav.world import MOVES, NavWalk, Trip, share_left, walk_along, without_loops
 from embodied.agents.iliad.protocol import ExecutionScores
