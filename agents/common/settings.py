@@ -1,5 +1,5 @@
-"""Settings that all learners share, checks of settings, and paths of the weights that ship with this repository. Free of
-torch, so that --help answers at once.
+"""Settings that all learners share, checks of settings, and paths of the weights that ship with this repository.
+Free of torch, so that --help answers at once.
 
 A learner's settings are a frozen record over one of these; a field that stands there again has a default of its own.
 agents/weights/README.md says how the weights were made.
