@@ -24,7 +24,7 @@ from embodied.options import (
 )
 
 if TYPE_CHECKING:
-    from embodied.agents.vision.training_data import TrainingData
+    from embodied.agents.vision.sighted_study import TrainingData
 
 PRESET = Option(words=tuple(RENDER_PRESETS), helps=PICTURE_HELP)
 
@@ -121,7 +121,7 @@ def training_data(args: Any, kind: str, device: str = "cpu") -> TrainingData:
     """
     from embodied.agents.common.parallel import check_device
     from embodied.agents.vision.encoder import load_encoder
-    from embodied.agents.vision.training_data import TrainingData
+    from embodied.agents.vision.sighted_study import TrainingData
     from embodied.datasets.store import dataset_of
 
     check_device(device)

@@ -20,8 +20,7 @@ from embodied.agents.common.weights import load_weights, save_weights
 from embodied.agents.learner import Learner, Players, PlaySettings
 from embodied.agents.options import Encoded, Limited, Repeated, StudyOptions, WithData, study_of, training_data
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.vision.sighted_study import FeatureStudy
-from embodied.agents.vision.training_data import TrainingData, evaluation_data
+from embodied.agents.vision.sighted_study import FeatureStudy, TrainingData, evaluation_data
 from embodied.interface import Actions, FeatureSource, Move, Observation, Observations, Rngs, Sight, Stop
 from embodied.options import OutputFolder, Settings
 

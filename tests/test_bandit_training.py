@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from embodied.agents.bandit import corpus, libreoffice
+from embodied.agents.bandit import corpus
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import CorpusError, Pair, Sizes
 from embodied.agents.bandit.network import (
@@ -155,17 +155,17 @@ def libreoffice_folder(root: Path) -> Path:
         ("de", ("Datum <i>und</i> Zeit", "Wählen Sie ein Datum. Drücken Sie OK.", "Rahmen")),
         ("en-US", ("Date <i>and</i> time", "Choose a date. Press OK.", "frame")),
     ):
-        path = root / libreoffice.HELP / language / "text" / "page.html"
+        path = root / corpus.HELP / language / "text" / "page.html"
         path.parent.mkdir(parents=True)
         path.write_text(page.format(*texts), encoding="utf-8")
-    menus = root / libreoffice.MENUS
+    menus = root / corpus.MENUS
     menus.mkdir(parents=True)
     (menus / "sw.mo").write_bytes(mo({"dialog|label\x04_Open a file…": "Datei ö~ffnen…"}))
     return root
 
 
 def test_help_and_menus_are_read_sentence_by_sentence(tmp_path):
-    assert libreoffice.read(libreoffice_folder(tmp_path)) == [
+    assert corpus.read(libreoffice_folder(tmp_path)) == [
         Pair("Datum und Zeit", "Date and time", "text/page.html"),
         Pair("Wählen Sie ein Datum.", "Choose a date.", "text/page.html"),
         Pair("Drücken Sie OK.", "Press OK.", "text/page.html"),
@@ -175,22 +175,22 @@ def test_help_and_menus_are_read_sentence_by_sentence(tmp_path):
 
 def test_a_missing_or_damaged_package_is_named(tmp_path):
     with pytest.raises(CorpusError, match="lacks package libreoffice-help-de .*apt-get download"):
-        libreoffice.read(tmp_path)
+        corpus.read(tmp_path)
     root = libreoffice_folder(tmp_path / "whole")
-    whole = (root / libreoffice.MENUS / "sw.mo").read_bytes()
+    whole = (root / corpus.MENUS / "sw.mo").read_bytes()
     for damaged in (b"no catalogue", b"", whole[:10], whole[:30], whole[:-20]):
-        (root / libreoffice.MENUS / "sw.mo").write_bytes(damaged)
+        (root / corpus.MENUS / "sw.mo").write_bytes(damaged)
         with pytest.raises(CorpusError, match="sw.mo: damaged"):
-            libreoffice.read(root)
+            corpus.read(root)
     (tmp_path / "libreoffice-help-de_1_all.deb").write_bytes(b"!<arch>\ncut")
     with pytest.raises((CorpusError, UnableError), match="damaged|dpkg-deb is needed"):
-        libreoffice.read(tmp_path)
+        corpus.read(tmp_path)
 
 
 def test_without_apt_the_packages_are_asked_for(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(UnableError, match="no apt-get here.*--from"):
-        libreoffice.fetch(tmp_path / "packages")
+        corpus.fetch(tmp_path / "packages")
 
 
 # Words and networks ------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from embodied.agents.find.network import AROUND, READ, Explorer, SeekNetwork
 from embodied.agents.find.policy import STOP, WORDS, Search, WayMap, costs_of
 from embodied.agents.find.study import Finder, FinderAbout, FindLearner, Labels, new_finder, tasks_in
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vision.training_data import Split
+from embodied.agents.vision.sighted_study import Split
 from embodied.evaluation.evaluate import play
 from embodied.interface import Move, Sight
 from embodied.kinds import metrics

@@ -45,7 +45,7 @@ from embodied.agents.hanna.agent import (
 from embodied.agents.hanna.policy import for_training
 from embodied.agents.hanna.training_config import EVALUATIONS, HANNA_SCALES, RULES, TrainingConfig, ask_above
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vision.training_data import Split
+from embodied.agents.vision.sighted_study import Split
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes
 from embodied.evaluation.evaluate import play

@@ -23,7 +23,7 @@ from embodied.agents.studies.engine import run_study
 from embodied.agents.vision.config import PLAIN
 from embodied.agents.vision.encoder import load_encoder, save_encoder
 from embodied.agents.vision.features import feature_path
-from embodied.agents.vision.training_data import TrainingData
+from embodied.agents.vision.sighted_study import TrainingData
 from embodied.cli import main
 from embodied.cli.view import looked_at
 from embodied.datasets.store import dataset_of

@@ -15,7 +15,7 @@ from test_hanna_learner import agent_for, setting
 
 from embodied.agents.hanna.agent import hanna_policies
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vision.training_data import Split
+from embodied.agents.vision.sighted_study import Split
 from embodied.evaluation.evaluate import play
 from embodied.interface import Agent, Episode, Observation, Sight, Viewpoint, is_picture, viewpoint
 from embodied.kinds import metrics

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from embodied.agents.bandit.libreoffice import _blocks
+from embodied.agents.bandit.corpus import _blocks
 from embodied.scene.usd import prim_name
 
 ROOT = Path(__file__).parents[1]
@@ -15,7 +15,7 @@ PARSERS = re.compile(
     r"ElementTree|lxml|minidom|expat|BeautifulSoup|from_xml_(path|string)|MjSpec\.from|mjcf\.from|Stage\.Open|Layer\.FindOrOpen"
 )
 READERS = {
-    "agents/bandit/libreoffice.py",  # pages of LibreOffice's help, as HTML: attacked below
+    "agents/bandit/corpus.py",  # pages of LibreOffice's help, as HTML: attacked below
     "embodied/envs/driven.py",  # what dm_control has just written itself
 }
 

@@ -1,4 +1,5 @@
-"""The training loop of imitation learners: play, label, update; validate; keep the best (agents.common.session).
+"""Agents that see features and learn by imitation: what stands beside the weights, and their file; and their training
+loop: play, label, update; validate; keep the best (agents.common.session).
 
 for update in session:
     learner.learn(update)           # play tasks, have them labelled, take a gradient step
@@ -13,10 +14,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Unpack
+from typing import Any, ClassVar, Self, Unpack
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from embodied.agents.common.session import (
     Options,
@@ -29,13 +30,86 @@ from embodied.agents.common.session import (
     set_learning_rate,
     tasks_of_update,
 )
-from embodied.agents.common.settings import MAY_CHANGE
+from embodied.agents.common.settings import MAY_CHANGE, EvaluationSettings, ImitationSettings
+from embodied.agents.common.vocabulary import Vocabulary, use_vectors, vocabulary_with
+from embodied.agents.common.weights import half_precision, load_into, load_weights, save_weights, seeded
 from embodied.envs.base import HelpEnv
 from embodied.errors import UnableError
 from embodied.evaluation.evaluate import play, rollout
 from embodied.interface import Actions, Agent, Ask, Episode, Observations, Place, Rngs, Situations, Task, act
 from embodied.kinds import metrics
 from embodied.records import Identity
+
+
+@dataclass(frozen=True, kw_only=True)
+class About:
+    """Metadata beside the weights in an agent's file; learners name the types of their settings."""
+
+    config: ImitationSettings
+    evaluation: EvaluationSettings = EvaluationSettings()
+    """How it is judged, if nobody says otherwise."""
+    encoder: str
+    """Digest of the encoder whose features it learned from; others mean nothing to it."""
+    feature_size: int
+    words: tuple[str, ...]
+    pictures: str = ""
+    """How the pictures were drawn that it learned from: 'fast_256', 'unlit_192'."""
+
+
+@dataclass(frozen=True, eq=False)
+class SightedAgent:
+    """A network with all that is needed to act again. A learner says `kind`, `about`, `network_of` and `policy`."""
+
+    about: Any
+    network: Any
+    vocabulary: Vocabulary
+
+    kind: ClassVar[str]
+    """Of its file."""
+    about_kind: ClassVar[type[About]]
+
+    @staticmethod
+    def network_of(about: Any) -> nn.Module:
+        """With random weights."""
+        raise NotImplementedError
+
+    def policy(self, bank: Any) -> Any:
+        """The agent as it is judged, with features that it sees.
+
+        Raises:
+          ValueError: features of another encoder.
+        """
+        raise NotImplementedError
+
+    @property
+    def config(self) -> Any:
+        return self.about.config
+
+    @classmethod
+    def new(cls, about: About) -> Self:
+        """An untrained agent; its weights follow from the seed."""
+        with seeded(about.config.seed):
+            network, vocabulary = cls.network_of(about), vocabulary_with(about.words, about.config.word_vectors)
+            use_vectors(network, vocabulary)
+            return cls(about, network, vocabulary)
+
+    def save(self, path: Path, identity: Identity | None = None) -> None:
+        """Write weights in half precision, with settings, words and what it was trained with, atomically."""
+        save_weights(path, self.kind, half_precision(self.network), self.about, identity)
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read what `save` wrote, ready to act.
+
+        Raises:
+          FileNotFoundError, OSError.
+          ValueError: truncated, changed, or of another format.
+        """
+        tensors, about = load_weights(path, cls.kind, cls.about_kind, "train the agent again with `embodied train`")
+        agent = cls.new(about)
+        load_into(agent.network, tensors, path)
+        agent.network.eval()
+        return agent
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ import torch.nn.functional as F
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
-from embodied.agents.common.imitation import Supervised, play_with_memory
+from embodied.agents.common.imitation import About, SightedAgent, Supervised, play_with_memory
 from embodied.agents.common.rows import choose_sampled
 from embodied.agents.common.session import (
     Note,
@@ -26,7 +26,6 @@ from embodied.agents.common.session import (
     tasks_of_update,
 )
 from embodied.agents.common.settings import EvaluationSettings
-from embodied.agents.common.sighted import About, SightedAgent
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features, load_into, load_weights, save_weights, seeded
 from embodied.agents.find.config import THINGS, FinderConfig
@@ -36,8 +35,7 @@ from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vision.sighted_study import SightedStudy
-from embodied.agents.vision.training_data import Split, TrainingData
+from embodied.agents.vision.sighted_study import SightedStudy, Split, TrainingData
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset, SplitData
 from embodied.evaluation.evaluate import play

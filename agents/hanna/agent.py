@@ -31,10 +31,9 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from embodied.agents.common import imitation
-from embodied.agents.common.losses import IGNORE, negative_log_likelihood
-from embodied.agents.common.rows import choose_at
+from embodied.agents.common.imitation import About, SightedAgent
+from embodied.agents.common.rows import IGNORE, choose_at, negative_log_likelihood
 from embodied.agents.common.session import Progress
-from embodied.agents.common.sighted import About, SightedAgent
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features
 from embodied.agents.hanna.attention import Percept, action_index
@@ -44,7 +43,7 @@ from embodied.agents.hanna.policy import HannaMemory, HannaPolicy, StepScores, f
 from embodied.agents.hanna.topological_map import MapPolicy, PerfectInterpretation
 from embodied.agents.hanna.training_config import RULES, HannaEvaluation, TrainingConfig, ask_patiently
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vision.training_data import Split, TrainingData
+from embodied.agents.vision.sighted_study import Split, TrainingData
 from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent, Episode, Place, Task, Teacher

@@ -14,8 +14,7 @@ from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfi
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.vision.sighted_study import TEST_SPLITS as TEST
-from embodied.agents.vision.sighted_study import SightedStudy
-from embodied.agents.vision.training_data import TrainingData
+from embodied.agents.vision.sighted_study import SightedStudy, TrainingData
 from embodied.datasets.store import Dataset, SplitData
 from embodied.interface import Agent
 

@@ -14,6 +14,7 @@ from embodied.agents.common.settings import (
     SHARE,
     WORD_VECTORS,
     Limit,
+    RunSettings,
     require,
     require_word,
 )
@@ -22,16 +23,14 @@ STUDENT_LEARNERS = ("adel", "dagger", "binary", "continuous")
 """ADEL (Algorithm 9), DAgger, and REINFORCE with a reward of success or of nearness."""
 
 
-@dataclass(frozen=True)
-class LearnerConfig:
+@dataclass(frozen=True, kw_only=True)
+class LearnerConfig(RunSettings):
     """The defaults are those of the dissertation for REGEX."""
 
     learner: str = "adel"
     """Learning algorithm: adel (Algorithm 9), dagger, or REINFORCE with a binary or a continuous reward."""
     iterations: int = 30_000
     """Updates of the weights."""
-    batch: int = 32
-    """Episodes per update."""
     learning_rate: float = 1e-3
     """Learning rate of Adam; REINFORCE uses a tenth of it, as in the dissertation."""
     mixing: float = 0.5
@@ -51,14 +50,12 @@ class LearnerConfig:
     validate_every: int = 500
     """Updates between validations."""
     checkpoint_minutes: float = 2.0
-    """Minutes between checkpoints."""
-    seed: int = 0
-    """Random seed of training."""
 
     def __post_init__(self) -> None:
         require_word(self, "learner", STUDENT_LEARNERS)
-        require(self, AT_LEAST_ONE, "iterations", "batch", "validate_every")
-        require(self, POSITIVE, "learning_rate", "clip", "checkpoint_minutes")
+        super().__post_init__()
+        require(self, AT_LEAST_ONE, "iterations", "validate_every")
+        require(self, POSITIVE, "learning_rate", "clip")
         require(self, SHARE, "mixing", "least_mixing", "cooldown", "threshold")
         require(self, NOT_NEGATIVE, "anneal_every", "entropy")
 
@@ -79,7 +76,37 @@ TEACHERS = ("learned", "grammar")
 
 
 @dataclass(frozen=True)
-class RegexConfig:
+class TeacherConfig:
+    """Of the simulated teacher of a world; the defaults are the dissertation's for REGEX."""
+
+    hidden_size: int = 512
+    """Width of all networks."""
+    teacher: str = "learned"
+    """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1), or 'grammar', the templates
+    that word the requests, or the routes of data sets."""
+    candidates: int = 10
+    """Number of candidate descriptions: the likeliest and sampled ones (Table C.2); in NAV the first that leads the
+    executor to the end of the walk is given (docs/sources.md, S93, S141)."""
+    executor_iterations: int = 30_000
+    """Updates of the teacher's executor."""
+    describer_iterations: int = 40_000
+    """Updates of the teacher's describer."""
+    teacher_batch: int = 256
+    """Examples, or routes, per update of the teacher's networks, and in pre-training."""
+    teacher_rate: float = 1e-3
+    """Learning rate of the teacher's networks and of pre-training."""
+    data_seed: int = 0
+    """Random seed of data, further paths and teacher, which all students share."""
+
+    def __post_init__(self) -> None:
+        require_word(self, "teacher", TEACHERS)
+        require(self, POSITIVE, "teacher_rate")
+        require(self, AT_LEAST_ONE, "hidden_size", "candidates", "teacher_batch")
+        require(self, AT_LEAST_ONE, "executor_iterations", "describer_iterations")
+
+
+@dataclass(frozen=True)
+class RegexConfig(TeacherConfig):
     """The defaults are the dissertation's."""
 
     items: int = 114_503
@@ -90,38 +117,18 @@ class RegexConfig:
     """Number of made-up words that rules are applied to."""
     examples: int = 5
     """Word pairs per example; a description must fit all of them (J, tau)."""
-    hidden_size: int = 512
-    """Width of all recurrent networks."""
     word_size: int = 128
     """Width of the embeddings of words of a request."""
     character_size: int = 32
     """Width of the embeddings of letters and of characters of a rule."""
-    teacher: str = "learned"
-    """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1), or 'grammar', the templates
-    that word the requests."""
-    candidates: int = 10
-    """Number of candidate descriptions: the likeliest and sampled ones (Table C.2)."""
     unlabeled: int = 20_000
     """Number of unlabelled rules, drawn as those of requests are (docs/sources.md, S140)."""
-    executor_iterations: int = 30_000
-    """Updates of the teacher's executor."""
-    describer_iterations: int = 40_000
-    """Updates of the teacher's describer."""
     pretraining_iterations: int = 10_000
     """Updates of the student on unlabelled rules before it learns from descriptions; 0: none, as in the text."""
-    teacher_batch: int = 256
-    """Examples per update in training the teacher and in pre-training."""
-    teacher_rate: float = 1e-3
-    """Learning rate of the teacher and of pre-training."""
-    data_seed: int = 0
-    """Random seed of data and teacher, which all students share."""
 
     def __post_init__(self) -> None:
-        require_word(self, "teacher", TEACHERS)
-        require(self, POSITIVE, "teacher_rate")
-        require(self, AT_LEAST_ONE, "items", "held_out_items", "examples", "hidden_size", "word_size")
-        require(self, AT_LEAST_ONE, "character_size", "candidates", "unlabeled")
-        require(self, AT_LEAST_ONE, "executor_iterations", "describer_iterations", "teacher_batch")
+        super().__post_init__()
+        require(self, AT_LEAST_ONE, "items", "held_out_items", "examples", "word_size", "character_size", "unlabeled")
         require(self, NOT_NEGATIVE, "pretraining_iterations")
         require(self, Limit(lambda x: x >= 1000, "at least 1000"), "vocabulary")
 
@@ -161,11 +168,15 @@ LEARNER_SCALES: dict[str, LearnerConfig] = {
 
 
 @dataclass(frozen=True)
-class NavConfig:
+class NavConfig(TeacherConfig):
     """The defaults are the dissertation's."""
 
     hidden_size: int = 256
-    """Width of all networks."""
+    candidates: int = 5
+    executor_iterations: int = 20_000
+    describer_iterations: int = 20_000
+    teacher_batch: int = 32
+    teacher_rate: float = 1e-4
     heads: int = 8
     """Attention heads of the describer."""
     dropout: float = 0.0
@@ -180,34 +191,16 @@ class NavConfig:
     """DAgger, and the teacher's executor: share of training steps that the demonstrator takes (Ross et al. 2011)."""
     blind: bool = False
     """Ablation without vision: all features are zero to the student."""
-    teacher: str = "learned"
-    """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1), or 'grammar', the templates
-    that word the routes of data sets."""
-    candidates: int = 5
-    """Number of candidate descriptions: the likeliest and sampled ones (Table C.2); the first that leads the executor
-    to the end of the walk is given (docs/sources.md, S93, S141)."""
-    executor_iterations: int = 20_000
-    """Updates of the teacher's executor."""
-    describer_iterations: int = 20_000
-    """Updates of the teacher's describer."""
-    teacher_batch: int = 32
-    """Routes per update of the teacher's networks."""
-    teacher_rate: float = 1e-4
-    """Learning rate of the teacher's networks."""
     more_paths: int = 0
     """Additional paths per training house, each worded three times."""
     word_vectors: str = LEARNED_WORDS
     """Word embeddings: 'learned', or 'minilm', pre-trained vectors in addition."""
-    data_seed: int = 0
-    """Random seed of the further paths and of the teacher, which all students share."""
 
     def __post_init__(self) -> None:
-        require_word(self, "teacher", TEACHERS)
+        super().__post_init__()
         require_word(self, "word_vectors", WORD_VECTORS)
-        require(self, AT_LEAST_ONE, "hidden_size", "heads", "candidates")
-        require(self, AT_LEAST_ONE, "executor_iterations", "describer_iterations", "teacher_batch")
+        require(self, AT_LEAST_ONE, "heads")
         require(self, NOT_NEGATIVE, "more_paths", "progress_weight", "room_weight")
-        require(self, POSITIVE, "teacher_rate")
         require(self, NOT_ALL, "dropout", "environment_dropout")
         require(self, SHARE, "guided")
         if self.hidden_size % self.heads:

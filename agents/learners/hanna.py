@@ -53,7 +53,7 @@ class HannaStudyOptions(EpisodeStudyOptions, Encoded, WithDevice):
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """Tables 4.3 to 4.5."""
     from embodied.agents.hanna.agent import WITHOUT_LEARNING, HannaAgent, players
-    from embodied.agents.vision.training_data import evaluation_data
+    from embodied.agents.vision.sighted_study import evaluation_data
 
     source, agent = evaluation_data(data, how), HannaAgent.load(file)
 

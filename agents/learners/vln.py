@@ -47,7 +47,7 @@ class VlnStudyOptions(EpisodeStudyOptions, Encoded):
 
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """The follower beside agents without learning."""
-    from embodied.agents.vision.training_data import evaluation_data
+    from embodied.agents.vision.sighted_study import evaluation_data
     from embodied.agents.vln.policy import VlnAgent
     from embodied.kinds.task_kind import PLAIN_AGENTS
 

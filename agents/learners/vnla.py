@@ -57,7 +57,7 @@ class VnlaStudyOptions(EpisodeStudyOptions, Encoded):
 
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """The learned asker beside other askers, direct intervention and agents without learning."""
-    from embodied.agents.vision.training_data import evaluation_data
+    from embodied.agents.vision.sighted_study import evaluation_data
     from embodied.agents.vnla.agent import BLIND, WITHOUT_LEARNING, VnlaAgent
 
     source, agent = evaluation_data(data, how), VnlaAgent.load(file)

@@ -1,24 +1,110 @@
-"""Studies of agents that see features: what is common to them."""
+"""Training data of learners by imitation: a split of a data set, ready to be played with features; and what is
+common to studies of agents that see features."""
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
+from embodied.agents.common.imitation import About, SightedAgent, TaskSet
 from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
-from embodied.agents.common.sighted import SightedAgent
+from embodied.agents.common.vocabulary import Vocabulary
+from embodied.agents.learner import PlaySettings
 from embodied.agents.studies.episodes import EpisodeStudy
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.vision.encoder import load_encoder
+from embodied.agents.vision.config import SAME_TIME
+from embodied.agents.vision.encoder import Encoder, load_encoder
+from embodied.agents.vision.extract import drawings_of, drawn_world, house_features, pictures_of
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vision.training_data import TrainingData
+from embodied.agents.vision.live import LiveFeatures
 from embodied.assets.cache import default_cache
-from embodied.datasets.store import dataset_of
+from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
+from embodied.evaluation.evaluate import spread
+from embodied.gym.sensors import PanoramaStore
 from embodied.interface import Agent
+
+A = TypeVar("A", bound=About)
+
+
+@dataclass(frozen=True, eq=False)
+class Split(TaskSet):
+    """Tasks of some houses, the environment they are played in, and what is seen there."""
+
+    bank: FeatureBank
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingData:
+    """A data set with features, from which an agent learns, and the device."""
+
+    data: Dataset
+    encoder: Encoder
+    picture_kind: str | None = None
+    """Of the pictures that the features come from, as in embodied.agents.vision.extract.pictures_of."""
+    device: str = "cpu"
+    goal_image: str = SAME_TIME
+    """One of embodied.agents.vision.config.GOAL_IMAGES."""
+    cache: Path = field(default_factory=default_cache)
+    """Folder of the furniture, for other pictures than the agent sees."""
+
+    def split(self, name: str, *, limit: int | None = None, houses: int | None = None, rules: Any = None) -> Split:
+        """At most `limit` tasks of a split, from its first `houses` houses; `rules` as in Dataset.split.
+
+        Raises:
+          ValueError: more houses than there are.
+          FileNotFoundError: features are missing.
+        """
+        data, encoder, kind = self.data, self.encoder.digest, self.picture_kind
+        if houses is not None and houses > (there := len(data.names(name))):
+            raise ValueError(f"{houses} houses of {name!r} are wanted, {data.folder} has {there}; ask for fewer")
+        split = data.split(name, houses=houses, rules=rules)
+        tasks = split.tasks if limit is None else spread(split.tasks, limit)
+        features = functools.partial(house_features, data, list(split.worlds), encoder, kind, self.cache)
+        live = functools.cache(functools.partial(self._live, list(split.worlds)))
+        bank = FeatureBank(features(), encoder, lambda sight: live().features(sight)).to(self.device)
+        if self.goal_image != SAME_TIME:
+            bank = bank.with_goal_images(features(self.goal_image))
+        return Split(split.worlds, tasks, split.make_env, bank)
+
+    def _live(self, names: Sequence[str]) -> LiveFeatures:
+        """Features of houses as their doors are."""
+        pictures = {n: pictures_of(self.data, n, self.picture_kind) for n in names}
+        worlds = {n: drawn_world(self.data, n, self.cache, pictures[n]) for n in names}
+        return LiveFeatures(self.encoder, PanoramaStore(worlds))
+
+    def identity(self) -> dict[str, str]:
+        """Everything that an agent depends on besides its settings: the data set, the encoder, how its houses were
+        drawn."""
+        shown = {} if self.goal_image == SAME_TIME else {"shown": self.goal_image}
+        return {"data": self.data.digest, "encoder": self.encoder.digest, "pictures": self.pictures("train"), **shown}
+
+    def about(self, kind: type[A], config: ImitationSettings, evaluation: EvaluationSettings, words: Vocabulary) -> A:
+        """Metadata beside the weights of an agent that learns here."""
+        encoder, pictures = self.encoder, self.pictures("train")
+        return kind(
+            config=config,
+            evaluation=evaluation,
+            encoder=encoder.digest,
+            feature_size=encoder.size,
+            words=words.words,
+            pictures=pictures,
+        )
+
+    def pictures(self, name: str) -> str:
+        """How the pictures of a split's houses were drawn, in words: 'unlit_192', or several of them."""
+        return drawings_of(self.data, self.data.names(name), self.picture_kind)
+
+
+def evaluation_data(data: Dataset, how: PlaySettings) -> TrainingData:
+    """A data set as a trained agent is evaluated in it."""
+    encoder = load_encoder(how.encoder)
+    return TrainingData(data, encoder, how.pictures, goal_image=how.goal_image, cache=how.cache)
+
 
 TEST_SPLITS = ("test_seen", "test_unseen")
 

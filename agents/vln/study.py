@@ -18,16 +18,14 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from embodied.agents.common import imitation
-from embodied.agents.common.losses import IGNORE, negative_log_likelihood
-from embodied.agents.common.rows import choose_sampled
+from embodied.agents.common.rows import IGNORE, choose_sampled, negative_log_likelihood
 from embodied.agents.common.session import Note, Progress
 from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy
-from embodied.agents.vision.training_data import Split, TrainingData
+from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy, Split, TrainingData
 from embodied.agents.vln.config import MEASURES, FollowerSettings
 from embodied.agents.vln.policy import VlnAbout, VlnAgent, VlnMoment
 from embodied.assets.cache import digest

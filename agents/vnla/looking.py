@@ -18,7 +18,7 @@ from embodied.action_spaces import node_ahead
 from embodied.agents.common.vocabulary import Vocabulary, WordEmbedding
 from embodied.agents.find.network import Look
 from embodied.agents.find.policy import WORDS, wanted
-from embodied.agents.vision.training_data import Split
+from embodied.agents.vision.sighted_study import Split
 from embodied.interface import TURNS, Pose, Sight
 
 READ, READING = 2 * TURNS + 1, 3 * TURNS + 2

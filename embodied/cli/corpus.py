@@ -30,8 +30,8 @@ class CorpusOptions(Cached):
 
 
 def run(args: CorpusOptions) -> None:
-    from embodied.agents.bandit import corpus, libreoffice
+    from embodied.agents.bandit import corpus
 
-    folder = args.folder or libreoffice.fetch(args.cache / "libreoffice")
-    facts = {"source": "LibreOffice (MPL-2.0)", "packages": libreoffice.versions(folder)}
-    corpus.make_corpus(libreoffice.read(folder), args.out, args.sizes, seed=args.seed, note=note, **facts)
+    folder = args.folder or corpus.fetch(args.cache / "libreoffice")
+    facts = {"source": "LibreOffice (MPL-2.0)", "packages": corpus.versions(folder)}
+    corpus.make_corpus(corpus.read(folder), args.out, args.sizes, seed=args.seed, note=note, **facts)
