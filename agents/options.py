@@ -119,7 +119,7 @@ def training_data(args: Any, kind: str, device: str = "cpu") -> TrainingData:
       DatasetError: a data set of another kind.
       UnableError: there is no such device.
     """
-    from embodied.agents.common.parallel import check_device
+    from embodied.agents.common.tensors import check_device
     from embodied.agents.vision.encoder import load_encoder
     from embodied.agents.vision.sighted_study import TrainingData
     from embodied.datasets.store import dataset_of

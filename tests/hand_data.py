@@ -116,8 +116,8 @@ def paint(data, pictures, names=None):
 def noise_features(data, encoder=None, seed=0):
     """Features of nothing for all houses of a data set, as an encoder makes them, or that of COMPACT; returns it."""
     from embodied.agents.vision.encoder import load_encoder
-    from embodied.agents.vision.extract import pictures_of
     from embodied.agents.vision.features import feature_path, save_features
+    from embodied.agents.vision.run import pictures_of
 
     encoder = encoder or load_encoder(COMPACT)
     for name in dict.fromkeys(n for split in data.splits for n in data.names(split)):

@@ -10,8 +10,8 @@ import sacrebleu
 import torch
 
 from embodied.agents.bandit.ratings import Rater, corpus_bleu, deviation, granular, sentence_bleu, skewed
-from embodied.agents.common.rows import Decisions, actor_loss, advantages, critic_loss
 from embodied.agents.common.session import DivergedError, descend
+from embodied.agents.common.tensors import Decisions, actor_loss, advantages, critic_loss
 from embodied.seeds import stream
 
 

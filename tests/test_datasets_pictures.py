@@ -11,11 +11,10 @@ import pytest
 from hand_data import build, random_encoder, small_house
 from handmade import HandCatalogue
 
-from embodied.agents.vision import extract
 from embodied.agents.vision import run as vision
 from embodied.agents.vision.config import LATER_CAMERA, PLAIN, RENDER_PRESETS, SAME_TIME
-from embodied.agents.vision.extract import Extractor, captured_path
 from embodied.agents.vision.features import encode_panoramas, feature_path, load_features
+from embodied.agents.vision.run import Extractor, captured_path
 from embodied.cli.dataset import chosen_pictures
 from embodied.datasets import build as building
 from embodied.datasets.store import Dataset
@@ -48,7 +47,7 @@ def data(tmp_path_factory) -> Dataset:
 
 @pytest.fixture(autouse=True)
 def hand_catalogue(monkeypatch):
-    for module in (building, extract):
+    for module in (building, vision):
         monkeypatch.setattr(module, "load_catalogue", lambda *_, **__: HandCatalogue())
 
 
@@ -161,7 +160,7 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
         pretend_drawn(data, name, lit, code="whoever drew them")
     assert features(None).startswith("3 of 3 houses made, pictures: 3 fast_gloss_16")
     assert features("fast").startswith("0 of 3 houses made")
-    monkeypatch.setattr(extract, "house_at", lambda data, name, goal_image, cache: data.place(name).house)  # no routes
+    monkeypatch.setattr(vision, "house_at", lambda data, name, goal_image, cache: data.place(name).house)  # no routes
     assert features("unlit", LATER_CAMERA).startswith("3 of 3 houses made")
     assert {line.split(": ")[1].split(";")[0] for line in lines[:-1]} == {LATER_CAMERA}, "the others are still there"
     assert all(captured_path(data, n, LATER_CAMERA, encoder.digest, SMALL).exists() for n in names)

@@ -11,8 +11,7 @@ from hand_pixels import coloured_strips
 from embodied.agents.common.weights import origin_of, weights_digest
 from embodied.agents.vision.config import RENDER_PRESETS, StripTraining, VisionConfig, drawing
 from embodied.agents.vision.detector import Detector
-from embodied.agents.vision.extract import StripSource
-from embodied.agents.vision.run import detector_for, train_vision
+from embodied.agents.vision.run import StripSource, detector_for, train_vision
 from embodied.records import read_json
 
 

@@ -19,7 +19,6 @@ from hand_worlds import grid_world
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
 from embodied.agents.common.imitation import play_with_memory
-from embodied.agents.common.rows import choose_at, choose_greedily, choose_sampled
 from embodied.agents.common.session import (
     DivergedError,
     Session,
@@ -27,6 +26,7 @@ from embodied.agents.common.session import (
     tasks_of_update,
     within_standard_error,
 )
+from embodied.agents.common.tensors import choose_at, choose_greedily, choose_sampled
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
 from embodied.agents.common.weights import CheckpointError, restore
 from embodied.agents.hanna.agent import (

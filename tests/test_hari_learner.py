@@ -13,7 +13,7 @@ from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common.imitation import TaskSet
-from embodied.agents.common.rows import Decisions, actor_loss, costs_to_go, critic_loss
+from embodied.agents.common.tensors import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.weights import CheckpointError
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.networks import (

@@ -7,7 +7,7 @@ import pytest
 import torch
 from hand_worlds import grid_world, line_world
 
-from embodied.agents.common.rows import greedy_choice
+from embodied.agents.common.tensors import greedy_choice
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.hanna.attention import orientation
 from embodied.agents.iliad.config import LearnerConfig, NavConfig

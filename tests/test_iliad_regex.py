@@ -10,7 +10,7 @@ import torch
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from embodied.agents.common.rows import greedy_choice
+from embodied.agents.common.tensors import greedy_choice
 from embodied.agents.common.weights import CheckpointError
 from embodied.agents.iliad.config import LearnerConfig, RegexConfig
 from embodied.agents.iliad.regex.data import LEAST_CHANGED, WordTask, made_up, make_data, rules_without_requests

@@ -51,7 +51,7 @@ def test_the_wheel_holds_the_types_the_weights_and_the_catalogue(wheel):
 
 
 NEIGHBOURS = """
-import agents, embodied.agents.common.rows, embodied.assets.catalogue
+import agents, embodied.agents.common.tensors, embodied.assets.catalogue
 from embodied.assets.closure import code_digest
 from embodied.gym.registration import register_with_gymnasium
 

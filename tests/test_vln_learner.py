@@ -11,8 +11,8 @@ import torch
 from hand_data import built
 from hand_worlds import grid_world
 
-from embodied.agents.common.rows import IGNORE
 from embodied.agents.common.settings import SHIPPED_ENCODER, SHIPPED_VLN
+from embodied.agents.common.tensors import IGNORE
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import FeatureBank

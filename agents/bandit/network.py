@@ -17,7 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from embodied.agents.bandit.config import BanditConfig
-from embodied.agents.common.rows import Choice, Rows, greedy_choice
+from embodied.agents.common.tensors import Choice, Rows, greedy_choice
 from embodied.agents.common.vocabulary import END_NUMBER, PAD_NUMBER, Vocabulary
 from embodied.agents.common.weights import load_into, load_weights, save_weights
 from embodied.records import Identity

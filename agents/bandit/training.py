@@ -37,8 +37,8 @@ from embodied.agents.bandit.network import (
     tokenized,
 )
 from embodied.agents.bandit.ratings import CLEAN, Rater, corpus_bleu, sentence_bleu
-from embodied.agents.common.rows import Decisions, actor_loss, critic_loss, sampled_choice
 from embodied.agents.common.session import Note, Session, descend
+from embodied.agents.common.tensors import Decisions, actor_loss, critic_loss, sampled_choice
 from embodied.agents.common.vocabulary import Vocabulary, most_frequent
 from embodied.agents.common.weights import Stateful, weights_digest
 from embodied.records import Identity, identity_of

@@ -36,7 +36,7 @@ from embodied.agents.common.weights import half_precision, load_into, load_weigh
 from embodied.envs.base import HelpEnv
 from embodied.errors import UnableError
 from embodied.evaluation.evaluate import play, rollout
-from embodied.interface import Actions, Agent, Ask, Episode, Observations, Place, Rngs, Situations, Task, act
+from embodied.interface import Actions, Agent, Ask, Episode, Observations, Place, Rngs, Situations, Task
 from embodied.kinds import metrics
 from embodied.records import Identity
 
@@ -127,20 +127,6 @@ class Supervised:
         return self.policy.play(observations, situations, memory, rngs=rngs, **self.how)
 
 
-class _MemoryKeeper:
-    """An agent that keeps the memory of its last call, because `rollout` does not hand it out."""
-
-    def __init__(self, agent: Agent) -> None:
-        self._agent = agent
-        self.memory: Any = None
-
-    def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
-    ) -> tuple[Actions, Any]:
-        actions, self.memory = act(self._agent, observations, situations, memory, rngs=rngs)
-        return actions, self.memory
-
-
 @dataclass(frozen=True, eq=False)
 class TaskSet:
     """Tasks of some houses and the environment they are played in."""
@@ -154,10 +140,12 @@ def play_with_memory(
     make_env: Callable[[], HelpEnv], agent: Agent, tasks: Sequence[Task], *, seed: int
 ) -> tuple[tuple[Episode, ...], Any]:
     """Play `tasks` side by side; their episodes and the agent's last memory."""
-    remembering = _MemoryKeeper(agent)
-    frames = rollout(make_env, remembering, tasks, seed=seed, batch=len(tasks))
-    done = {f.index: f.episode for f in frames if f.episode is not None}
-    return tuple(done[i] for i in range(len(tasks))), remembering.memory
+    done, memory = {}, None
+    for frame in rollout(make_env, agent, tasks, seed=seed, batch=len(tasks)):
+        memory = frame.memory
+        if frame.episode is not None:
+            done[frame.index] = frame.episode
+    return tuple(done[i] for i in range(len(tasks))), memory
 
 
 VALIDATION_BATCH = 32

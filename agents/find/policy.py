@@ -17,7 +17,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from embodied.agents.common.rows import Chooser, choose_greedily
+from embodied.agents.common.tensors import Chooser, choose_greedily
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.find.network import SeekNetwork
 from embodied.agents.hanna.topological_map import SAME_PLACE, fewest_moves, matches

@@ -16,7 +16,6 @@ import torch.nn.functional as F
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
 from embodied.agents.common.imitation import About, SightedAgent, Supervised, play_with_memory
-from embodied.agents.common.rows import choose_sampled
 from embodied.agents.common.session import (
     Note,
     descend,
@@ -26,6 +25,7 @@ from embodied.agents.common.session import (
     tasks_of_update,
 )
 from embodied.agents.common.settings import EvaluationSettings
+from embodied.agents.common.tensors import choose_sampled
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features, load_into, load_weights, save_weights, seeded
 from embodied.agents.find.config import THINGS, FinderConfig

@@ -32,8 +32,8 @@ from torch import Tensor
 
 from embodied.agents.common import imitation
 from embodied.agents.common.imitation import About, SightedAgent
-from embodied.agents.common.rows import IGNORE, choose_at, negative_log_likelihood
 from embodied.agents.common.session import Progress
+from embodied.agents.common.tensors import IGNORE, choose_at, negative_log_likelihood
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features
 from embodied.agents.hanna.attention import Percept, action_index

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from embodied.agents.common.rows import Rows
+from embodied.agents.common.tensors import Rows
 from embodied.agents.common.vocabulary import WordEmbedding
 from embodied.agents.hanna.attention import SLOTS, VIEWS, DotAttend, Percept, action_size
 from embodied.agents.hanna.network import AgentNetwork

@@ -21,7 +21,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from embodied.agents.common.rows import Rows
+from embodied.agents.common.tensors import Rows
 from embodied.agents.hanna.attention import (
     REQUEST,
     SLOTS,

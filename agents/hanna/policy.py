@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from embodied.agents.common.rows import Chooser, RunningRows, choose_greedily, choose_sampled, hidden_channels
+from embodied.agents.common.tensors import Chooser, RunningRows, choose_greedily, choose_sampled, hidden_channels
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.hanna.attention import (
     COPIES,

@@ -22,8 +22,8 @@ import torch
 from torch import Tensor
 
 from embodied.agents.common.imitation import TaskSet
-from embodied.agents.common.rows import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.session import Options, Progress, Session, descend, episode_seed, run, tasks_of_update
+from embodied.agents.common.tensors import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.weights import Stateful, checksum_of, load_into, weights_digest
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.networks import (

@@ -17,7 +17,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from embodied.agents.common.rows import Decisions, actor_loss
+from embodied.agents.common.tensors import Decisions, actor_loss
 
 Tasks = Sequence[Any]
 """Tasks q = (R, s_1, d*)."""

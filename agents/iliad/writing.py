@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from embodied.agents.common.rows import Choice, Rows
+from embodied.agents.common.tensors import Choice, Rows
 
 PAD = 0
 

@@ -12,7 +12,7 @@ from embodied.options import Count, Option, OutputFolder, Settings, whole
 
 if TYPE_CHECKING:
     from embodied.agents.common.session import Note
-    from embodied.agents.vision.extract import StripSource
+    from embodied.agents.vision.run import StripSource
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +29,7 @@ class StripTrainingOptions(Drawn, WithDevice, WithData):
 
     def source(self) -> StripSource:
         """The strips of the data set."""
-        from embodied.agents.vision.extract import StripSource
+        from embodied.agents.vision.run import StripSource
 
         folder = self.strips or self.out / "strips"
         return StripSource(self.data, folder, self.cache, self.pictures, self.lit_houses, self.workers)

@@ -21,8 +21,8 @@ from typing import Any, ClassVar
 
 import joblib
 
-from embodied.agents.common.parallel import use_threads
 from embodied.agents.common.session import Note
+from embodied.agents.common.tensors import use_threads
 from embodied.agents.common.weights import read_checkpoint, weights_digest
 from embodied.agents.studies.tables import StudyRow, StudyTable, draw, page
 from embodied.assets.cache import digest, write_bytes, write_json

@@ -1,27 +1,230 @@
-"""The work of the encoder's commands: train it, train a detector on it, and make features with it."""
+"""The work of the encoder's commands: train it, train a detector on it, and make features with it, where they are
+missing: the pictures of a data set's houses as encoders look at them, how they are drawn, and strips with labels;
+and goal images that were taken at another time than the agent is there.
+
+In place recognition these are changes of appearance (hour, weather, lamps), of the scene (people, things) and of the
+camera.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import joblib
 import numpy as np
 
-from embodied.agents.common.parallel import check_device
 from embodied.agents.common.session import Note
-from embodied.agents.vision.config import StripTraining, VisionConfig, drawing
+from embodied.agents.common.tensors import check_device, use_threads
+from embodied.agents.vision.config import LATER_CAMERA, RENDER_PRESETS, SAME_TIME, StripTraining, VisionConfig, drawing
 from embodied.agents.vision.detector import labelled, read, train_detector
 from embodied.agents.vision.encoder import Encoder, load_encoder, save_encoder
-from embodied.agents.vision.extract import Extractor, StripSource, drawings_of, pictures_of
+from embodied.agents.vision.features import (
+    EQUIRECT,
+    HouseStrips,
+    all_classes,
+    encode_strips,
+    feature_path,
+    has_features,
+    load_features,
+    look,
+    margin,
+    save_features,
+)
 from embodied.agents.vision.training import train_encoder, whitened
-from embodied.assets.cache import write_json
+from embodied.assets.cache import digest, write_json
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.closure import code_digest
+from embodied.assets.json_file import read_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
+from embodied.generate.rearrange import rearranged
+from embodied.house.house import House
+from embodied.interface import Route
+from embodied.light import lightings_of
 from embodied.locks import locked
-from embodied.records import Identity, identity_of
+from embodied.records import Identity, identity_of, load_lines
+from embodied.render.photograph import PhotoCamera
+from embodied.render.pictures import PictureSettings, Traced
+from embodied.world import World, open_world
+
+
+def pictures_of(data: Dataset, name: str, picture_kind: str | None = None) -> PictureSettings:
+    """How the pictures of a house are drawn that features are made from.
+
+    Args:
+      picture_kind: one of RENDER_PRESETS; None takes the panoramas that the data set holds, and plain ones where it
+        holds none.
+    """
+    drawn = data.drawn_pictures(name)
+    if drawn is None or picture_kind not in (None, drawn.word):
+        return RENDER_PRESETS[picture_kind or "unlit"]
+    return drawn
+
+
+def drawings_of(data: Dataset, names: Sequence[str], picture_kind: str | None = None) -> str:
+    """How the pictures of some houses are drawn, in words: 'unlit_192', or several of them."""
+    return ", ".join(sorted({drawing(pictures_of(data, name, picture_kind)) for name in names}))
+
+
+def drawn_world(data: Dataset, name: str, cache: Path, pictures: PictureSettings, lit: House | None = None) -> World:
+    """A house drawn so: the panoramas that the data set holds, if they are, else new ones, and those are left alone.
+
+    Args:
+      lit: the house in another light than its own.
+    """
+    place, catalogue = data.place(name), load_catalogue(cache)
+    if lit in (None, place.house) and pictures == data.drawn_pictures(name):
+        return data.open_world(name, catalogue, cache, pictures)
+    return open_world(lit or place.house, catalogue, cache, pictures, graph=place.graph)
+
+
+@dataclass(frozen=True)
+class StripSource:
+    """The strips of a data set's houses, drawn so, kept in a folder."""
+
+    data: Path
+    """Folder of the data set."""
+    folder: Path
+    cache: Path
+    picture_kind: str | None = None
+    """As `pictures_of` takes it."""
+    lit: int = 0
+    """So many training houses are seen in light ('fast')."""
+    workers: int = 1
+    """Houses drawn side by side."""
+
+    def training_strips(self, names: Sequence[str], note: Callable[[str], None]) -> list[HouseStrips]:
+        """The strips of training houses, the first `lit` of them in light."""
+        in_light = dataclasses.replace(self, picture_kind="fast")
+        return [*in_light.strips(names[: self.lit], note), *self.strips(names[self.lit :], note)]
+
+    def strips(self, names: Sequence[str], note: Callable[[str], None]) -> list[HouseStrips]:
+        """The strips of houses, drawn where they are missing."""
+        data = Dataset(self.data)
+        jobs = (joblib.delayed(self._draw)(n) for n in names if not self._path(data, n).exists())
+        for name in joblib.Parallel(n_jobs=self.workers, return_as="generator_unordered")(jobs):
+            note(f"drawn: {name}")
+        return [HouseStrips.load(self._path(data, n)) for n in names]
+
+    def _path(self, data: Dataset, name: str) -> Path:
+        """The file in which the strips of a house are."""
+        return self.folder / drawing(pictures_of(data, name, self.picture_kind)) / f"{name}.npz"
+
+    def _draw(self, name: str) -> str:
+        data = Dataset(self.data)
+        pictures, classes = pictures_of(data, name, self.picture_kind), all_classes(load_catalogue(self.cache))
+        with drawn_world(data, name, self.cache, pictures) as world:
+            look(world, classes).save(self._path(data, name))
+        return name
+
+
+LATER_DAY, LATER_LIGHTING = 1, 1
+"""Of pictures taken later: the day of embodied.generate.rearrange, and the number in embodied.light.lightings_of."""
+FEATURE_ENDINGS = {SAME_TIME: "", LATER_CAMERA: f"+light{LATER_LIGHTING}+day{LATER_DAY}+robot"}
+"""Of the names of files with features, after the house."""
+CAMERAS_OF = {SAME_TIME: PhotoCamera(), LATER_CAMERA: PhotoCamera("robot", seed=LATER_DAY)}
+
+
+def house_at(data: Dataset, name: str, goal_image: str, cache: Path) -> House:
+    """A house of a data set as goal images show it."""
+    place = data.place(name)
+    if goal_image == SAME_TIME:
+        return place.house
+    starts = [route.path[0] for route in load_lines(data.folder / "houses" / name / "routes.jsonl", Route)]
+    house = rearranged(place.house, place.graph, load_catalogue(cache), starts, day=LATER_DAY)
+    return lightings_of(house, LATER_LIGHTING + 1)[-1]
+
+
+def digest_at(data: Dataset, name: str, goal_image: str, cache: Path) -> str:
+    """The digest of that house, kept in the cache: another day takes a second to make."""
+    if goal_image == SAME_TIME:
+        return data.place(name).house.digest
+    key = digest([data.digest, name, LATER_LIGHTING, LATER_DAY, code_digest("embodied.agents.vision.run")])
+    path = cache / "days" / f"{key[:32]}.json"
+    if not path.exists():
+        write_json(path, {"house": house_at(data, name, goal_image, cache).digest})
+    return str(read_json(path)["house"])
+
+
+def captured_path(data: Dataset, name: str, goal_image: str, encoder: str, pictures: PictureSettings) -> Path:
+    """The file with the features of goal images of a house; `encoder` is a digest."""
+    return feature_path(data.folder / "features", encoder, name + FEATURE_ENDINGS[goal_image], pictures)
+
+
+def house_features(
+    data: Dataset,
+    names: Sequence[str],
+    encoder: str,
+    picture_kind: str | None,
+    cache: Path,
+    goal_image: str = SAME_TIME,
+) -> dict[str, np.ndarray]:
+    """(n, 36, D) features of some houses, as goal images show them; `encoder` is a digest.
+
+    Raises:
+      FileNotFoundError: features are missing.
+      ValueError: they are damaged, or another house's.
+    """
+    features = {}
+    for name in sorted(names):
+        pictures = pictures_of(data, name, picture_kind)
+        path = captured_path(data, name, goal_image, encoder, pictures)
+        source = digest_at(data, name, goal_image, cache)
+        features[name] = load_features(path, encoder=encoder, source=source, pictures=pictures)
+    return features
+
+
+def features_of(world: World, encoder: Encoder, goal_image: str = SAME_TIME) -> np.ndarray:
+    """(n, 36, D) float16 features of the panoramas of a house, as the camera of such goal images takes them."""
+    if isinstance(world.pictures, Traced) or goal_image != SAME_TIME:
+        world.render_all()  # kept: they cost minutes a house
+    camera, house = CAMERAS_OF[goal_image], world.house.name
+    seen = (world.panorama(node).equirect(EQUIRECT) for node in range(len(world.graph.positions)))
+    photographs = (camera.photographed(picture, None, house, node) for node, picture in enumerate(seen))
+    return encode_strips(encoder, (photograph[margin()] for photograph in photographs))
+
+
+@dataclass(frozen=True)
+class Extractor:
+    """Extracts the features of one house after the other; small, so that it can be sent to other processes."""
+
+    data: Path
+    """Folder of the data set, which keeps the features."""
+    encoder: Encoder
+    cache: Path
+    picture_kind: str | None = None
+    """Of the pictures, as embodied.agents.vision.run.pictures_of takes it."""
+    goal_images: tuple[str, ...] = (SAME_TIME,)
+    """Some of embodied.agents.vision.config.GOAL_IMAGES."""
+    threads: int = 1
+
+    def missing(self, name: str) -> list[str]:
+        """The goal images of which a house has no features."""
+        data, encoder = Dataset(self.data), self.encoder
+        pictures = pictures_of(data, name, self.picture_kind)
+
+        def is_there(goal_image: str) -> bool:
+            path = captured_path(data, name, goal_image, encoder.digest, pictures)
+            return has_features(path, encoder, digest_at(data, name, goal_image, self.cache), pictures)
+
+        return [goal_image for goal_image in dict.fromkeys(self.goal_images) if not is_there(goal_image)]
+
+    def __call__(self, name: str) -> str:
+        """Extract the missing features of a house; returns a line about it."""
+        use_threads(self.threads)
+        data, missing = Dataset(self.data), self.missing(name)
+        pictures = pictures_of(data, name, self.picture_kind)
+        for goal_image in missing:
+            house = house_at(data, name, goal_image, self.cache)
+            with drawn_world(data, name, self.cache, pictures, house) as world:
+                path = captured_path(data, name, goal_image, self.encoder.digest, pictures)
+                save_features(path, features_of(world, self.encoder, goal_image), self.encoder, house.digest, pictures)
+        return f"{name}: {', '.join(missing)}; {pictures.word} pictures of {pictures.size} pixels"
 
 
 def train_vision(

@@ -18,9 +18,9 @@ from embodied.agents.studies.episodes import EpisodeStudy
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.vision.config import SAME_TIME
 from embodied.agents.vision.encoder import Encoder, load_encoder
-from embodied.agents.vision.extract import drawings_of, drawn_world, house_features, pictures_of
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.live import LiveFeatures
+from embodied.agents.vision.run import drawings_of, drawn_world, house_features, pictures_of
 from embodied.assets.cache import default_cache
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
@@ -45,7 +45,7 @@ class TrainingData:
     data: Dataset
     encoder: Encoder
     picture_kind: str | None = None
-    """Of the pictures that the features come from, as in embodied.agents.vision.extract.pictures_of."""
+    """Of the pictures that the features come from, as in embodied.agents.vision.run.pictures_of."""
     device: str = "cpu"
     goal_image: str = SAME_TIME
     """One of embodied.agents.vision.config.GOAL_IMAGES."""

@@ -16,7 +16,15 @@ import torch
 from torch import Tensor, nn
 
 from embodied.agents.common.imitation import About, SightedAgent
-from embodied.agents.common.rows import IGNORE, Chooser, Rows, RunningRows, choose_at, choose_greedily, hidden_channels
+from embodied.agents.common.tensors import (
+    IGNORE,
+    Chooser,
+    Rows,
+    RunningRows,
+    choose_at,
+    choose_greedily,
+    hidden_channels,
+)
 from embodied.agents.common.vocabulary import Vocabulary, WordEmbedding
 from embodied.agents.common.weights import check_features
 from embodied.agents.hanna.attention import DotAttend, action_index, candidate_rows, orientation

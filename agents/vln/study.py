@@ -18,9 +18,9 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from embodied.agents.common import imitation
-from embodied.agents.common.rows import IGNORE, choose_sampled, negative_log_likelihood
 from embodied.agents.common.session import Note, Progress
 from embodied.agents.common.settings import EvaluationSettings
+from embodied.agents.common.tensors import IGNORE, choose_sampled, negative_log_likelihood
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable

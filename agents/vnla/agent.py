@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from embodied.agents.common.imitation import About, SightedAgent, Supervised
-from embodied.agents.common.rows import choose_at
+from embodied.agents.common.tensors import choose_at
 from embodied.agents.common.weights import check_features
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vnla.config import ASK_RULES, VnlaSettings

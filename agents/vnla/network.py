@@ -14,7 +14,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from embodied.action_spaces import WORDS
-from embodied.agents.common.rows import Rows
+from embodied.agents.common.tensors import Rows
 from embodied.agents.common.vocabulary import WordEmbedding
 from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.looking import READING, Looker

@@ -18,7 +18,7 @@ from torch import Tensor
 
 from embodied.action_spaces import WORDS
 from embodied.agents.common.imitation import Supervised
-from embodied.agents.common.rows import Chooser, RunningRows, choose_greedily, choose_sampled
+from embodied.agents.common.tensors import Chooser, RunningRows, choose_greedily, choose_sampled
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.find.policy import WORDS as REQUEST
 from embodied.agents.vision.features import FeatureBank

@@ -18,9 +18,9 @@ from torch import Tensor
 
 from embodied.action_spaces import WORDS
 from embodied.agents.common import imitation
-from embodied.agents.common.rows import negative_log_likelihood
 from embodied.agents.common.session import Progress, descend, seeded_dropout, set_learning_rate
 from embodied.agents.common.settings import EvaluationSettings
+from embodied.agents.common.tensors import negative_log_likelihood
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import Split, TrainingData

@@ -314,11 +314,11 @@ def play_trained(evaluation: Evaluation, data: Dataset, learner: Learner, file: 
     Raises:
       ValueError: an unknown row.
     """
-    from embodied.agents.common.parallel import use_threads
+    from embodied.agents.common.tensors import use_threads
     from embodied.agents.common.weights import weights_digest
     from embodied.agents.learner import PlaySettings
     from embodied.agents.studies.episodes import JUDGES, evaluate_frozen
-    from embodied.agents.vision.extract import pictures_of
+    from embodied.agents.vision.run import pictures_of
     from embodied.records import identity_of
     from embodied.render.pictures import in_words
 

@@ -28,10 +28,9 @@ class FeatureOptions(WithData, Encoded, WithDevice):
 
 
 def run(args: FeatureOptions) -> None:
-    from embodied.agents.common.parallel import check_device
+    from embodied.agents.common.tensors import check_device
     from embodied.agents.vision.encoder import load_encoder
-    from embodied.agents.vision.extract import Extractor
-    from embodied.agents.vision.run import make_features
+    from embodied.agents.vision.run import Extractor, make_features
     from embodied.datasets.store import Dataset
 
     check_device(args.device)

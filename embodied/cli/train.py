@@ -29,7 +29,7 @@ def commands(words: Sequence[str]) -> Mapping[str, Any]:
 
 def trained(train: Callable[..., Any], args: Any) -> None:
     """Train once PyTorch has its threads, if the options say how many."""
-    from embodied.agents.common.parallel import use_threads
+    from embodied.agents.common.tensors import use_threads
 
     use_threads(getattr(args, "threads", 1))
     watch = {"on_validation": recorder(args)} if getattr(args, "rrd", False) else {}
@@ -38,7 +38,7 @@ def trained(train: Callable[..., Any], args: Any) -> None:
 
 def recorder(args: Any) -> Callable[[int, Sequence[Episode]], None]:
     """Records the first episodes of each validation for Rerun, with what the agent saw if it has an encoder."""
-    from embodied.agents.vision.extract import drawn_world, pictures_of
+    from embodied.agents.vision.run import drawn_world, pictures_of
     from embodied.datasets.store import Dataset
     from embodied.viz.recording import record_episode
     from embodied.viz.sinks import Sinks

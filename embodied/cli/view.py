@@ -77,7 +77,7 @@ def record_one(args: ViewOptions, episodes: Sequence[Listed], number: int) -> No
     with contextlib.ExitStack() as stack:
         eyes = None
         if seen is not None:
-            from embodied.agents.vision.extract import drawn_world  # loads torch
+            from embodied.agents.vision.run import drawn_world  # loads torch
 
             eyes = stack.enter_context(drawn_world(data, name, args.cache, seen))
         world = stack.enter_context(data.open_world(name, catalogue, args.cache, args.pictures, size=384))

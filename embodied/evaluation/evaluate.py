@@ -88,6 +88,8 @@ class Frame:
     """The action with its consequences."""
     episode: Episode | None
     """The whole episode with its last frame, else None."""
+    memory: Any
+    """The player's, of all episodes of the batch, after the action."""
 
 
 def rollout(
@@ -145,7 +147,7 @@ def _play(
                 raise TypeError(f"{type(player).__name__} gave no action for task {env.task.id!r}, which is not over")
             observations[i] = env.step(action)
             episode = env.episode(agent) if observations[i] is None else None
-            yield Frame(index, seen, situation, env.last_step, episode)
+            yield Frame(index, seen, situation, env.last_step, episode, memory)
 
 
 def read_seeds(path: Path) -> list[int]:

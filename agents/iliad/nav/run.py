@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from torch import Tensor
 
-from embodied.agents.common.rows import greedy_choice
 from embodied.agents.common.session import Note
+from embodied.agents.common.tensors import greedy_choice
 from embodied.agents.common.vocabulary import build_vocabulary, use_vectors, vocabulary_with
 from embodied.agents.common.weights import load_into, load_weights, save_weights, seeded
 from embodied.agents.iliad.config import NavConfig
@@ -31,8 +31,8 @@ from embodied.agents.iliad.nav.world import HORIZON, NavMarginal, NavWorld, Trip
 from embodied.agents.iliad.protocol import DescribingTeacher
 from embodied.agents.iliad.training import IliadProblem, asked, drawn, success_rate, successes, teach
 from embodied.agents.iliad.writing import likelihood_loss
-from embodied.agents.vision.extract import drawings_of, house_features
 from embodied.agents.vision.features import FeatureBank
+from embodied.agents.vision.run import drawings_of, house_features
 from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.policy import FollowerNetwork
 from embodied.agents.vln.study import more_routes
@@ -175,7 +175,7 @@ class NavSetup:
     encoder: str
     """Digest of the encoder that made them."""
     picture_kind: str | None
-    """Of the pictures, as in embodied.agents.vision.extract.pictures_of."""
+    """Of the pictures, as in embodied.agents.vision.run.pictures_of."""
     cache: Path
     """The cache with the catalogue."""
 

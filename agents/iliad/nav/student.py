@@ -13,7 +13,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.agents.common.rows import IGNORE, Choice, greedy_choice, negative_log_likelihood, sampled_choice
+from embodied.agents.common.tensors import IGNORE, Choice, greedy_choice, negative_log_likelihood, sampled_choice
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.hanna.attention import orientation
 from embodied.agents.iliad.config import NavConfig

@@ -13,7 +13,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from embodied.agents.common.rows import Choice, greedy_choice, sampled_choice
+from embodied.agents.common.tensors import Choice, greedy_choice, sampled_choice
 from embodied.agents.common.vocabulary import END_NUMBER, Vocabulary
 from embodied.agents.hanna.attention import DotAttend, FeedForward, MultiAttend
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent, Track

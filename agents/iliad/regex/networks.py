@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from embodied.agents.common.rows import Choice
+from embodied.agents.common.tensors import Choice
 from embodied.agents.common.vocabulary import END_NUMBER, Vocabulary, build_vocabulary
 from embodied.agents.iliad.regex.rules import ALPHABET, LETTERS, columns
 from embodied.agents.iliad.writing import AttentiveWriter, Bridge, Remembered, before, last, write

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from torch import Tensor
 
-from embodied.agents.common.rows import greedy_choice
 from embodied.agents.common.session import Note
+from embodied.agents.common.tensors import greedy_choice
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.common.weights import load_into, load_weights, save_weights, seeded
 from embodied.agents.iliad.config import RegexConfig

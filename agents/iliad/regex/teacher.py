@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from embodied.agents.common.rows import Choice, greedy_choice, sampled_choice
+from embodied.agents.common.tensors import Choice, greedy_choice, sampled_choice
 from embodied.agents.iliad.config import RegexConfig
 from embodied.agents.iliad.protocol import NOTHING, DescribingNetworks, ExecutionScores, one_request
 from embodied.agents.iliad.regex.data import Grammar, WordTask

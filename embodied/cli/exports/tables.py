@@ -63,8 +63,8 @@ def feature_rows(data: Dataset, args: ProgramOptions) -> Iterator[tuple[str, str
     import numpy as np
 
     from embodied.agents.vision.encoder import load_encoder
-    from embodied.agents.vision.extract import pictures_of
     from embodied.agents.vision.features import feature_path, load_features
+    from embodied.agents.vision.run import pictures_of
     from embodied.datasets.folders import names_of
 
     encoder = load_encoder(args.encoder)

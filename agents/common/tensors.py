@@ -1,6 +1,7 @@
-"""Records of tensors of which each row belongs to one agent, or sentence, of a batch; how an action is chosen from a
-distribution, and words, characters or actions of a batch from logits: the likeliest, or sampled; and the losses of
-imitation, one number per step, and of advantage actor-critic (Eq 3.5 to 3.7, E.1, E.2).
+"""Tensors of all learners: the devices that compute, with how many threads; records of which each row belongs to one
+agent, or sentence, of a batch; how an action is chosen from a distribution, and words, characters or actions of a batch
+from logits: the likeliest, or sampled; and the losses of imitation, one number per step, and of advantage actor-critic
+(Eq 3.5 to 3.7, E.1, E.2).
 
 Translations and walks are rated, intentions cost: B sequences (sentences, episodes) of up to T decisions (words, moves,
 intentions). Every decision is credited with its return less what the critic expected before it: one rating of the
@@ -19,6 +20,31 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 from torch import Tensor
+
+from embodied.errors import UnableError
+
+
+def check_device(device: str) -> None:
+    """Refuse a device that PyTorch cannot use here.
+
+    Raises:
+      UnableError: it is none, or there is no GPU.
+    """
+    try:
+        torch.zeros(1, device=device)
+    except (RuntimeError, AssertionError) as e:
+        raise UnableError(f"--device {device} cannot be used here ({str(e).splitlines()[0]}); use --device cpu") from e
+
+
+def use_threads(threads: int) -> None:
+    """Let PyTorch use so many threads on the CPU.
+
+    Raises:
+      ValueError: fewer than one.
+    """
+    if threads < 1:
+        raise ValueError(f"--threads should be at least 1, got {threads}")
+    torch.set_num_threads(threads)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
