@@ -73,7 +73,7 @@ def test_workers_read_what_their_parent_reads(data, start, many):
                 assert torch.equal(batch[name][i], tensor) and torch.equal(again[name], tensor), (k, name)
             k += 1
     assert k == len(pictures)
-    assert not pickle.loads(pickle.dumps(pictures))._open
+    assert torch.equal(pickle.loads(pickle.dumps(pictures))[0]["rgb"], alone[0]["rgb"])
 
 
 @pytest.mark.gl

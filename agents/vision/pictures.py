@@ -10,11 +10,11 @@ Nothing is drawn here: the data set must hold panoramas.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import os
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -102,8 +102,6 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
         self._known = [_known(data, name, self.classes) for name in names]
         self._each = VIEWS if view is not None and view.frame == "view" else 1
         self._ends = np.cumsum([self._each * len(h.positions) for h in self._known])
-        self._open: OrderedDict[int, PanoramaFile] = OrderedDict()
-        self._process = os.getpid()
 
     def set_epoch(self, epoch: int) -> None:
         """Other cameras for the same pictures; before a DataLoader starts its workers."""
@@ -139,10 +137,6 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
             "node": torch.tensor(node),
         }
 
-    def __getstate__(self) -> dict[str, Any]:
-        """To another process go no open files."""
-        return {**self.__dict__, "_open": OrderedDict()}
-
     def _camera_of(self, item: int) -> ViewSettings | None:
         """How item `item` is framed in this epoch, and by which device."""
         if not self._cameras or self._view is None:
@@ -155,24 +149,19 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
         self, house: int, node: int, yaw: float, pitch: float, view: ViewSettings | None
     ) -> dict[str, np.ndarray]:
         """The wanted channels of what is seen, colours last."""
-        panorama = self._file(house).read(node)
+        path = self._folder / "houses" / self.houses[house] / "panoramas.pano"
+        panorama = _opened(path, path.stat().st_mtime_ns, os.getpid()).read(node)
         if view is None:
             faces = {"rgb": panorama.rgb, "depth": np.minimum(panorama.depth, np.float32(FAR)), "ids": panorama.ids}
             return {name: faces[name] for name in self._channels}
         place = self.houses[house], node
         return {name: framed(panorama, view, name, yaw, pitch, place=place) for name in self._channels}
 
-    def _file(self, house: int) -> PanoramaFile:
-        """The panoramas of a house, opened by this process."""
-        if self._process != os.getpid():  # forked: the parent's files are the parent's
-            self._open, self._process = OrderedDict(), os.getpid()
-        if house not in self._open:
-            path = self._folder / "houses" / self.houses[house] / "panoramas.pano"
-            self._open[house] = PanoramaFile(path)
-            while len(self._open) > OPEN:
-                self._open.popitem(last=False)[1].close()
-        self._open.move_to_end(house)
-        return self._open[house]
+
+@functools.lru_cache(maxsize=OPEN)
+def _opened(path: Path, changed: int, process: int) -> PanoramaFile:
+    """The panoramas of a file that was last changed then, opened by a process: what is forked opens it anew."""
+    return PanoramaFile(path)
 
 
 def _colours_first(name: str, picture: np.ndarray) -> np.ndarray:
