@@ -30,9 +30,8 @@ from embodied.agents.hari.networks import (
 from embodied.agents.hari.policy import DO, DONE, Choice, Considered, HariPolicy, Reader, carry, consider, policy_of
 from embodied.agents.hari.pretraining import PretrainingData, guided_share, pretrain, pretraining_success
 from embodied.agents.hari.pretraining import train_step as lesson
-from embodied.agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
 from embodied.agents.hari.run import TEST, IntentionRun, counts_of, train, train_step, values
-from embodied.agents.hari.study import HariStudy
+from embodied.agents.hari.study import RULES, HariStudy, RandomWithBudgets, RuleAgent, RuleMoment
 from embodied.agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, percept
 from embodied.agents.studies.engine import run_study
 from embodied.assistants.descriptions import Describer, frequent_classes
@@ -260,7 +259,7 @@ def test_rows_say_what_stands_in_both_descriptions():
     stranger = Feature("object", "never seen", 1, 0, 2)
     nothing = Candidates(np.zeros(0, np.float32), np.zeros(0, np.float32), np.zeros(0, int), np.zeros(0, bool))
     pairs = [((far_mug, bed, stranger), (kitchen, mug, stranger)), ((mug,), (kitchen, mug))]
-    inputs = collate([percept(words, state, goal, nothing, 0) for state, goal in pairs])
+    inputs = collate([percept(words, words.rows(a, "state"), words.rows(b, "goal"), nothing, 0) for a, b in pairs])
     assert inputs.state_shared.tolist() == [[0, 1, 0, 0], [0, 2, 0, 0]], "markers and unknown names are not shared"
     assert inputs.goal_shared.tolist() == [[0, 0, 1, 0], [0, 0, 2, 0]]
 

@@ -15,26 +15,24 @@ from embodied.agents.common.weights import CheckpointError
 from embodied.agents.iliad.config import LearnerConfig, RegexConfig
 from embodied.agents.iliad.regex.data import LEAST_CHANGED, WordTask, made_up, make_data, rules_without_requests
 from embodied.agents.iliad.regex.language import PARTS, templates
-from embodied.agents.iliad.regex.networks import (
-    PAD,
-    ChangeDescriber,
-    Speller,
-    changes,
-    characters,
-    request_words,
-    texts,
-)
 from embodied.agents.iliad.regex.rules import (
     ALPHABET,
     LETTERS,
     LONGEST_BLOCK,
     LONGEST_OUTPUT,
+    PAD,
     SHAPES,
+    ChangeDescriber,
+    Speller,
     apply,
+    changes,
+    characters,
     columns,
     edit_distance,
     outputs,
     random_rule,
+    request_words,
+    texts,
 )
 from embodied.agents.iliad.regex.run import RegexSetup, load_student, new_network
 from embodied.agents.iliad.regex.teacher import (

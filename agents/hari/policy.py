@@ -21,7 +21,7 @@ from embodied.agents.hari.networks import (
     RecurrentHead,
     shown_probabilities,
 )
-from embodied.agents.hari.words import collate, percept_of_rows
+from embodied.agents.hari.words import collate, percept
 from embodied.interface import (
     Action,
     Actions,
@@ -119,7 +119,7 @@ def consider(reader: Reader, observations: Observations, memory: Belief | None) 
     states = [reader("state", o.extras.state_description) for o in seen]
     goals = [reader("goal", o.extras.goal_descriptions[-1]) for o in seen]
     together = zip(states, goals, seen, strict=True)
-    inputs = collate([percept_of_rows(words, s.rows, g.rows, o.candidates, o.turn) for s, g, o in together])
+    inputs = collate([percept(words, s.rows, g.rows, o.candidates, o.turn) for s, g, o in together])
     state, goal = (EncodedDescriptions.together([r.encoded for r in some]) for some in (states, goals))
     belief, log_moves = network(memory.carried[rows], inputs, state, goal)
     return Considered(rows, belief, log_moves), memory

@@ -166,7 +166,7 @@ def _steps(
     goals: EncodedDescriptions | None = None,
 ) -> Iterator[tuple[list[ExecutionWalk], list[Sequence[Pose]], Tensor]]:
     """The steps of walks: b that have not ended, where their moves lead, and log-probabilities (b, C + 1) of these."""
-    beliefs = executor.network.begin(len(walks))  # (B, h)
+    words, beliefs = executor.words, executor.network.begin(len(walks))  # (B, h)
     for _ in range(horizon):
         alive = [i for i, w in enumerate(walks) if not w.ended]
         if not alive:
@@ -174,7 +174,7 @@ def _steps(
         going = [walks[i] for i in alive]
         reach = [source.moves.at(w.place, w.pose) for w in going]
         rows = [
-            percept(executor.words, describe(w), w.goal, candidates, w.pose.turn)
+            percept(words, words.rows(describe(w), "state"), words.rows(w.goal, "goal"), candidates, w.pose.turn)
             for w, (candidates, _) in zip(going, reach, strict=True)
         ]
         goal = None if goals is None else goals[alive]

@@ -105,16 +105,7 @@ class Inputs(PerceptRows):
     """(B, G) int64, likewise."""
 
 
-def percept(
-    words: FeatureWords, state: Description, goal: Description, candidates: Candidates, turn: int
-) -> PerceptRows:
-    """One agent's descriptions and moves as rows."""
-    return percept_of_rows(words, words.rows(state, "state"), words.rows(goal, "goal"), candidates, turn)
-
-
-def percept_of_rows(
-    words: FeatureWords, state: np.ndarray, goal: np.ndarray, candidates: Candidates, turn: int
-) -> PerceptRows:
+def percept(words: FeatureWords, state: np.ndarray, goal: np.ndarray, candidates: Candidates, turn: int) -> PerceptRows:
     """One agent's moves as rows beside those of its descriptions."""
     moves, angles = move_rows(words, candidates), move_angles(candidates, turn)
     return PerceptRows(state, goal, moves, angles, np.append(candidates.allowed, True))

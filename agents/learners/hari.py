@@ -80,8 +80,8 @@ def study(args: HariStudyOptions) -> StudyLearner:
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """Rows of Table 4.7 for one agent, in the environment that it was trained for."""
     from embodied.agents.hari.networks import load_agent
-    from embodied.agents.hari.rules import policies
     from embodied.agents.hari.run import rules_of, validation_means
+    from embodied.agents.hari.study import policies
 
     agent = load_agent(file)
     rows = policies(agent, validation_means(data, agent, seed=how.seed))

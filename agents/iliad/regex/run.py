@@ -19,16 +19,16 @@ from embodied.agents.common.weights import load_into, load_weights, save_weights
 from embodied.agents.iliad.config import RegexConfig
 from embodied.agents.iliad.protocol import NOTHING, DescribingTeacher
 from embodied.agents.iliad.regex.data import RegexData, WordTask, make_data, rules_without_requests
-from embodied.agents.iliad.regex.networks import (
+from embodied.agents.iliad.regex.rules import (
     ChangeDescriber,
     Requests,
     Speller,
     changes,
     characters,
+    outputs,
     request_words,
     texts,
 )
-from embodied.agents.iliad.regex.rules import outputs
 from embodied.agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher, RegexMarginal, RegexStudent, RegexWorld
 from embodied.agents.iliad.training import IliadProblem, Network, asked, drawn, successes, teach
 from embodied.agents.iliad.writing import likelihood_loss

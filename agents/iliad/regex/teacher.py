@@ -15,24 +15,22 @@ from embodied.agents.common.tensors import Choice, greedy_choice, sampled_choice
 from embodied.agents.iliad.config import RegexConfig
 from embodied.agents.iliad.protocol import NOTHING, DescribingNetworks, ExecutionScores, one_request
 from embodied.agents.iliad.regex.data import Grammar, WordTask
-from embodied.agents.iliad.regex.networks import (
-    LONGEST_REQUEST,
-    PAD,
-    ChangeDescriber,
-    Requests,
-    Speller,
-    changes,
-    characters,
-    texts,
-)
 from embodied.agents.iliad.regex.rules import (
     LETTERS,
     LONGEST_BLOCK,
+    LONGEST_REQUEST,
+    PAD,
     REPLACEMENTS,
     SAME,
+    ChangeDescriber,
+    Requests,
     RuleShape,
+    Speller,
+    changes,
+    characters,
     edit_distance,
     outputs,
+    texts,
 )
 
 
