@@ -18,7 +18,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from embodied.agents.common.shipped import SHIPPED_ENCODER
+from embodied.agents.common.settings import SHIPPED_ENCODER
 from embodied.agents.common.weights import seeded
 from embodied.agents.vision.encoder import load_encoder
 from embodied.datasets.vqa.scoring import LETTERS, VqaQuestion
