@@ -24,14 +24,13 @@ from embodied.agents.bandit.network import (
     decode,
     greedy,
     load_network,
-    padded,
     perplexity,
 )
 from embodied.agents.bandit.ratings import Rater
 from embodied.agents.bandit.study import BanditStudy
 from embodied.agents.bandit.training import bandit, load_corpus, pretrain, train_critic
 from embodied.agents.common.session import Session
-from embodied.agents.common.tensors import sampled_choice
+from embodied.agents.common.tensors import padded, sampled_choice
 from embodied.agents.common.vocabulary import END_NUMBER, PAD_NUMBER, most_frequent
 from embodied.agents.common.weights import load_weights, read_checkpoint
 from embodied.agents.studies.engine import run_study

@@ -17,7 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from embodied.agents.bandit.config import BanditConfig
-from embodied.agents.common.tensors import Choice, Rows, greedy_choice
+from embodied.agents.common.tensors import Choice, Rows, greedy_choice, padded
 from embodied.agents.common.vocabulary import END_NUMBER, PAD_NUMBER, Vocabulary
 from embodied.agents.common.weights import load_into, load_weights, save_weights
 from embodied.records import Identity
@@ -208,12 +208,6 @@ def tokenized(
     return TokenizedCorpus(
         [source.sentence(a) for a, _ in pairs], [target.sentence(b) for _, b in pairs], [tuple(b) for _, b in pairs]
     )
-
-
-def padded(sentences: Sequence[Sequence[int]]) -> Tensor:
-    """(B, longest) int64, PAD behind each sentence's end."""
-    rows = [torch.tensor(s, dtype=torch.long) for s in sentences]
-    return torch.nn.utils.rnn.pad_sequence(rows, batch_first=True, padding_value=PAD_NUMBER)
 
 
 def batches(lengths: Sequence[int], size: int, rng: np.random.Generator) -> list[np.ndarray]:

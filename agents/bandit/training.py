@@ -31,14 +31,13 @@ from embodied.agents.bandit.network import (
     decode,
     greedy,
     load_network,
-    padded,
     perplexity,
     save_network,
     tokenized,
 )
 from embodied.agents.bandit.ratings import CLEAN, Rater, corpus_bleu, sentence_bleu
 from embodied.agents.common.session import Note, Session, descend
-from embodied.agents.common.tensors import Decisions, actor_loss, critic_loss, sampled_choice
+from embodied.agents.common.tensors import Decisions, actor_loss, critic_loss, padded, sampled_choice
 from embodied.agents.common.vocabulary import Vocabulary, most_frequent
 from embodied.agents.common.weights import Stateful, weights_digest
 from embodied.records import Identity, identity_of

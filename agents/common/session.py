@@ -306,11 +306,8 @@ def stop_signal() -> Iterator[threading.Event]:
 def tasks_of_update(tasks: Sequence[T], update: int, batch: int, seed: int) -> list[T]:
     """The tasks (or sentences, or whatever is learned from) of one update: each once per pass, each pass in its own
     random order."""
-    chosen = []
-    for k in range(update * batch, (update + 1) * batch):
-        turn, place = divmod(k, len(tasks))
-        chosen.append((turn, place))
-    orders = {turn: stream(seed, "tasks", turn).permutation(len(tasks)) for turn in sorted({t for t, _ in chosen})}
+    chosen = [divmod(k, len(tasks)) for k in range(update * batch, (update + 1) * batch)]
+    orders = {turn: stream(seed, "tasks", turn).permutation(len(tasks)) for turn in dict.fromkeys(t for t, _ in chosen)}
     return [tasks[int(orders[turn][place])] for turn, place in chosen]
 
 

@@ -12,7 +12,7 @@ the value here and the signs of E.1 and E.2 turn around.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -86,6 +86,11 @@ def _kept(value: Any, rows: list[int]) -> Any:
     if value and hasattr(value[0], "select"):
         return tuple(v.select(rows) for v in value)
     return tuple(value[r] for r in rows) if value else ()
+
+
+def padded(rows: Sequence[Sequence[int] | np.ndarray]) -> Tensor:
+    """(B, longest) int64 of rows of whole numbers, zeros behind their ends."""
+    return torch.nn.utils.rnn.pad_sequence([torch.as_tensor(r, dtype=torch.long) for r in rows], batch_first=True)
 
 
 def hidden_channels(episodes: int, size: int, share: float, device: Any = None) -> Tensor | None:

@@ -17,7 +17,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from embodied.agents.common.tensors import Chooser, choose_greedily
+from embodied.agents.common.tensors import Chooser, choose_greedily, padded
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.find.network import SeekNetwork
 from embodied.agents.hanna.topological_map import SAME_PLACE, fewest_moves, matches
@@ -277,11 +277,6 @@ def wanted(costs: np.ndarray) -> np.ndarray:
     """(m,) float32: how likely options of these costs should be."""
     weights = np.exp((costs.min() - costs) / CERTAIN)
     return (weights / weights.sum()).astype(np.float32)
-
-
-def padded(rows: Sequence[np.ndarray]) -> Tensor:
-    """(N, A) int64 of rows of different lengths, filled with 0."""
-    return torch.nn.utils.rnn.pad_sequence([torch.from_numpy(np.asarray(r, dtype=np.int64)) for r in rows], True)
 
 
 def imitation_loss(scorer: SeekNetwork, searches: Sequence[Search]) -> tuple[Tensor, Tensor]:

@@ -235,26 +235,14 @@ def all_classes(catalogue: Catalogue) -> tuple[str, ...]:
 def look(world: World, classes: Sequence[str]) -> HouseStrips:
     """Draw the nodes of a world, and label what is seen."""
     object_class, room_of_id = ids_to_labels(world.house, classes)
-    rgb, share, rooms, depths, room = [], [], [], [], []
-    rows = margin()
+    looks, rows = [], margin()
     for node in range(len(world.graph.positions)):
         panorama = world.panorama(node)
         ids, depth = panorama.equirect_ids(EQUIRECT)[rows], panorama.equirect_depth(EQUIRECT)[rows]
         labels = cell_labels(ids, np.minimum(depth, FARTHEST), object_class, room_of_id, len(classes))
-        rgb.append(strip_of(panorama))
-        share.append(labels[0])
-        rooms.append(labels[1])
-        depths.append(labels[2])
-        room.append(ROOM_KINDS.index(world.house.room_by_id[str(world.graph.room_of_node[node])].kind))
-    return HouseStrips(
-        world.house.name,
-        tuple(classes),
-        np.stack(rgb),
-        np.stack(share),
-        np.stack(rooms),
-        np.stack(depths),
-        np.array(room, dtype=np.int8),
-    )
+        room = ROOM_KINDS.index(world.house.room_by_id[str(world.graph.room_of_node[node])].kind)
+        looks.append((strip_of(panorama), *labels, np.int8(room)))
+    return HouseStrips(world.house.name, tuple(classes), *map(np.stack, zip(*looks, strict=True)))
 
 
 def ids_to_labels(house: House, classes: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:

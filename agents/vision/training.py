@@ -104,23 +104,15 @@ def batches(
     columns = np.asarray(classes)
     for start in range(0, len(order) - len(order) % size, size):
         chosen = [where[k] for k in order[start : start + size]]
-        rgb, share, rooms, depth, room = [], [], [], [], []
+        rows = []
         for house, i in chosen:
             turn, mirror = int(rng.integers(STRIP_COLUMNS)), bool(rng.random() < 0.5)
-            rgb.append(recolour(turn_strip(house.rgb[i], turn * CELL, mirror), shade, rng=rng))
-            share.append(turn_strip(house.share[i], turn, mirror)[..., columns])
-            rooms.append(turn_strip(house.rooms[i], turn, mirror))
-            depth.append(turn_strip(house.log_depth[i], turn, mirror))
-            room.append(house.room[i])
-        shares = np.stack(share)
-        yield StripBatch(
-            torch.from_numpy(np.stack(rgb)),
-            torch.from_numpy(shares),
-            torch.from_numpy(visible_in_views(shares)),
-            torch.from_numpy(np.stack(rooms).astype(np.int64)),
-            torch.from_numpy(np.stack(depth).astype(np.float32)),
-            torch.from_numpy(np.array(room, dtype=np.int64)),
-        )
+            rgb = recolour(turn_strip(house.rgb[i], turn * CELL, mirror), shade, rng=rng)
+            share, rooms, depth = (turn_strip(x[i], turn, mirror) for x in (house.share, house.rooms, house.log_depth))
+            rows.append((rgb, share[..., columns], rooms.astype(np.int64), depth.astype(np.float32), house.room[i]))
+        rgb, share, rooms, depth, room = map(np.stack, zip(*rows, strict=True))
+        arrays = rgb, share, visible_in_views(share), rooms, depth, room.astype(np.int64)
+        yield StripBatch(*map(torch.from_numpy, arrays))
 
 
 def turn_strip(strip: np.ndarray, columns: int, mirror: bool) -> np.ndarray:
