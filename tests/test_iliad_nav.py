@@ -19,7 +19,6 @@ from embodied.agents.iliad.nav.teacher import (
     WalkDescriber,
     arrives,
     encoded_walks,
-    texts_of,
 )
 from embodied.agents.iliad.nav.world import (
     HORIZON,
@@ -192,8 +191,9 @@ def test_walks_are_read_and_described_whoever_is_beside():
     describer = WalkDescriber(len(look.vocabulary), 32, 2, look.size, HORIZON)
     trips = [Trip("grid", Pose(n), (n,), ("go",)) for n in (5, 0)]
     walks = [walk_along([5, 6, 7]), walk_along([0])]
-    both = texts_of(look.vocabulary, describer.write(*encoded_walks(look, trips, walks), greedy_choice, 6))
-    alone = texts_of(look.vocabulary, describer.write(*encoded_walks(look, trips[1:], walks[1:]), greedy_choice, 6))
+    both = look.vocabulary.texts(describer.write(*encoded_walks(look, trips, walks), greedy_choice, 6).tolist())
+    written = describer.write(*encoded_walks(look, trips[1:], walks[1:]), greedy_choice, 6)
+    alone = look.vocabulary.texts(written.tolist())
     assert both[1:] == alone
     teacher = LearnedNavTeacher(NavWorld({"grid": GRID}), describer, student(look), 2)
     found = teacher.describe(trips, walks, rng=stream(0, "t"))

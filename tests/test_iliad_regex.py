@@ -208,7 +208,7 @@ def test_what_is_written_does_not_depend_on_who_is_beside(data):
             words, asked = characters([q.words[0] for q in some]), requests([q.requests[0] for q in some])
             rules += texts(speller.write(words, asked, greedy_choice, 12))
             pairs = changes([list(zip(q.words, q.outputs)) for q in some])
-            said += requests.say(describer.write(pairs, greedy_choice, 12))
+            said += requests.vocabulary.texts(describer.write(pairs, greedy_choice, 12).tolist())
         return rules, said
 
     assert written(1) == written(5) == written(32)

@@ -90,6 +90,10 @@ class Vocabulary:
         before = itertools.takewhile(lambda n: n != END_NUMBER, numbers)
         return tuple(self.words[n] for n in before if n != PAD_NUMBER)
 
+    def texts(self, rows: Iterable[Iterable[int]]) -> list[str]:
+        """What rows of numbers say, each up to its END."""
+        return [" ".join(self.decode(row)) for row in rows]
+
     @functools.cached_property
     def _encoded(self) -> dict[tuple[str, int, bool], np.ndarray]:
         return {}

@@ -25,7 +25,6 @@ from embodied.agents.iliad.nav.teacher import (
     WalkDescriber,
     arrives,
     encoded_walks,
-    texts_of,
 )
 from embodied.agents.iliad.nav.world import HORIZON, NavMarginal, NavWorld, Trip, trips_of, walk_along
 from embodied.agents.iliad.protocol import DescribingTeacher
@@ -117,7 +116,7 @@ def followed(world: NavWorld, describer: WalkDescriber, executor: NavStudent, tr
     """Share of paths whose likeliest description leads the executor to their end."""
     walks = [walk_along(t.path) for t in trips]
     numbers = describer.write(*encoded_walks(executor.eyes, trips, walks), greedy_choice, LONGEST_DESCRIPTION)
-    done = executor.greedy(trips, texts_of(executor.eyes.vocabulary, numbers))
+    done = executor.greedy(trips, executor.eyes.vocabulary.texts(numbers.tolist()))
     return float(np.mean([arrives(world, t, e.nodes, t.path) for t, e in zip(trips, done, strict=True)]))
 
 

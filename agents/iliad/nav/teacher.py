@@ -14,7 +14,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from embodied.agents.common.tensors import Choice, greedy_choice, sampled_choice
-from embodied.agents.common.vocabulary import END_NUMBER, Vocabulary
+from embodied.agents.common.vocabulary import END_NUMBER
 from embodied.agents.hanna.attention import DotAttend, FeedForward, MultiAttend
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent, Track
 from embodied.agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
@@ -87,11 +87,6 @@ def encoded_walks(eyes: NavEyes, trips: Sequence[Trip], walks: Sequence[NavWalk]
     return torch.stack(views, 1), torch.stack(actions, 1), mask
 
 
-def texts_of(vocabulary: Vocabulary, numbers: Tensor) -> list[str]:
-    """Descriptions of (B, T) words, up to each end."""
-    return [" ".join(vocabulary.decode(row)) for row in numbers.tolist()]
-
-
 class LearnedNavTeacher(DescribingNetworks):
     """Eq 3.15 and 3.16 with two networks."""
 
@@ -115,7 +110,7 @@ class LearnedNavTeacher(DescribingNetworks):
         numbers = self.describer.write(
             *encoded_walks(self.eyes, tasks, executions), choose, LONGEST_DESCRIPTION, copies
         )
-        drawn = texts_of(self.eyes.vocabulary, numbers)
+        drawn = self.eyes.vocabulary.texts(numbers.tolist())
         return [list(dict.fromkeys(drawn[k * copies : (k + 1) * copies])) for k in range(len(tasks))]
 
     def fits(self, cases: Sequence[tuple[Trip, NavWalk, str]]) -> list[bool]:

@@ -239,10 +239,6 @@ class Requests:
         """(B, longest) int64 words, each with its END_CODE if it fits, padded."""
         return torch.from_numpy(self.vocabulary.batch(requests, LONGEST_REQUEST))
 
-    def say(self, numbers: Tensor) -> list[str]:
-        """Requests of (B, T) words, up to each END_CODE."""
-        return [" ".join(self.vocabulary.decode(row)) for row in numbers.tolist()]
-
 
 def request_words(requests: Iterable[str]) -> Requests:
     """Numbers for the words of these requests and for single letters."""

@@ -168,7 +168,8 @@ class LearnedTeacher(DescribingNetworks):
         changed = changes([list(zip(q.words, e.outputs or (), strict=True)) for q, e in zip(tasks, executions)])
         copies = 1 if uniforms is None else uniforms.shape[1]
         choose = greedy_choice if uniforms is None else sampled_choice(uniforms.reshape(-1, uniforms.shape[2]))
-        texts = self.requests.say(self.describer.write(changed, choose, LONGEST_REQUEST, copies))
+        numbers = self.describer.write(changed, choose, LONGEST_REQUEST, copies)
+        texts = self.requests.vocabulary.texts(numbers.tolist())
         several = [texts[k * copies : (k + 1) * copies] for k in range(len(tasks))]
         return [[d for d in dict.fromkeys(many) if d != NOTHING] or [NOTHING] for many in several]
 
