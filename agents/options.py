@@ -97,8 +97,8 @@ class Run(WithData, Timed, Scaled):
 
 @dataclass(frozen=True, kw_only=True)
 class Nav(Cached, Encoded):
-    data: InputFolder | None = None
-    """NAV: the data set, a folder that `embodied dataset vln` or `hanna` built."""
+    data: InputFolder
+    """The data set, a folder that `embodied dataset vln` or `hanna` built."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,14 +167,11 @@ class Repeated:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limited:
+class EpisodeStudyOptions(StudyOptions, Repeated, WithData, Scaled):
+    """Options of studies whose agents play episodes."""
+
     tasks: Count | None = None
     """Evaluate on at most N tasks of a split, spread over its houses (default: all)."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class EpisodeStudyOptions(StudyOptions, Repeated, Limited, WithData, Scaled):
-    """Options of studies whose agents play episodes."""
 
 
 def study_by(name: str) -> Callable[[Any], Any]:

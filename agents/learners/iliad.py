@@ -18,7 +18,7 @@ from embodied.agents.iliad.config import (
 )
 from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import Nav, Repeated, ScaledDown, StudyOptions, Tables, Threaded, Timed, study_of
-from embodied.options import InputFolder, OutputFolder, Settings
+from embodied.options import OutputFolder, Settings
 
 if TYPE_CHECKING:
     from embodied.agents.common.session import Note
@@ -49,7 +49,6 @@ class RegexTraining(IliadTraining):
 class NavTraining(IliadTraining, Nav):
     """Follow routes through houses, on a `vln` or `hanna` data set with features."""
 
-    data: InputFolder
     learner: Annotated[LearnerConfig, Settings(STUDENT, NAV_LEARNER_SCALES)]
     world: Annotated[NavConfig, Settings(WORLD, NAV_SCALES)]
 
@@ -72,7 +71,6 @@ class RegexStudyOptions(IliadStudyOptions):
 class NavStudyOptions(IliadStudyOptions, Nav):
     """Students that learn to follow routes from descriptions."""
 
-    data: InputFolder
     config: Annotated[LearnerConfig, Settings(STUDENT, NAV_LEARNER_SCALES, skip=OF_ROWS)]
     world: Annotated[NavConfig, Settings(WORLD, NAV_SCALES, skip=("blind",))]
 
