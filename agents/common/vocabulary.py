@@ -91,7 +91,7 @@ class Vocabulary:
         return tuple(self.words[n] for n in before if n != PAD_NUMBER)
 
     def texts(self, rows: Iterable[Iterable[int]]) -> list[str]:
-        """What rows of numbers say, each up to its END."""
+        """Texts of rows of numbers, each up to its END."""
         return [" ".join(self.decode(row)) for row in rows]
 
     @functools.cached_property
