@@ -121,29 +121,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
-    except (ValueError, OSError, UnableError) as e:
-        if "--traceback" in argv:
+    except (ValueError, OSError, UnableError, BrokenExecutor, ImportError) as e:  # executors: joblib's workers
+        if "--traceback" in argv or (isinstance(e, ImportError) and _extra_of(e) is None):
             raise
         _close_bars()
         print(f"error: {message_of(e)}", file=sys.stderr)
         return 2
-    except BrokenExecutor:  # of joblib's workers
-        if "--traceback" in argv:
-            raise
-        _close_bars()
-        print(f"error: {KILLED}", file=sys.stderr)
-        return 2
-    except ImportError as e:
-        extra = EXTRAS.get((e.name or "").partition(".")[0])
-        if "--traceback" in argv or not extra:
-            raise
-        missing = f"this needs {e.name}, which is not installed; pip install 'embodied-houses[{extra}]'"
-        print(f"error: {missing}", file=sys.stderr)
-        return 2
+
+
+def _extra_of(error: ImportError) -> str | None:
+    return EXTRAS.get((error.name or "").partition(".")[0])
 
 
 def message_of(error: Exception) -> str:
     """An error in one line, with the remedy."""
+    if isinstance(error, BrokenExecutor):
+        return KILLED
+    if isinstance(error, ImportError):
+        return f"this needs {error.name}, which is not installed; pip install 'embodied-houses[{_extra_of(error)}]'"
     if isinstance(error, OSError) and error.errno in REMEDIES and error.strerror:
         where = f"{error.filename}: " if error.filename else ""
         return f"{where}{error.strerror}: {REMEDIES[error.errno]}"

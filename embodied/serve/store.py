@@ -39,7 +39,7 @@ class Event:
 
 
 class Store:
-    """One SQLite file in WAL mode. Events that come while a transaction is being written share the next one."""
+    """One SQLite file in WAL mode, written by a thread of its own."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -47,8 +47,7 @@ class Store:
             self._db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
             self._db.executescript(EVENT_TABLES)
         self._thread = ThreadPoolExecutor(1, "store")
-        self._waiting: list[tuple[Event, asyncio.Future[None]]] = []
-        self._writing: asyncio.Task[None] | None = None
+        self._failed = False
 
     def about(self, name: str, default: str) -> str:
         """A fact that is kept with the events; `default` is written down where there is none."""
@@ -73,38 +72,22 @@ class Store:
 
     async def append(self, event: Event) -> None:
         """Returns when the event is on disk; events are kept in the order of the calls."""
-        written = asyncio.get_running_loop().create_future()
-        self._waiting.append((event, written))
-        if self._writing is None or self._writing.done():
-            self._writing = asyncio.create_task(self._write_all())
-        await written
+        await asyncio.shield(asyncio.get_running_loop().run_in_executor(self._thread, self._write, event))
 
     async def flush(self) -> None:
         """Returns when all events so far are on disk."""
-        if self._writing is not None:
-            await asyncio.shield(self._writing)
+        await asyncio.get_running_loop().run_in_executor(self._thread, int)
 
     def close(self) -> None:
         self._thread.shutdown()
         self._db.close()
 
-    async def _write_all(self) -> None:
-        while self._waiting:
-            batch, self._waiting = self._waiting, []
-            try:
-                await asyncio.get_running_loop().run_in_executor(self._thread, self._write, [e for e, _ in batch])
-            except sqlite3.Error as e:
-                for _, written in batch + self._waiting:
-                    if not written.done():
-                        written.set_exception(e)
-                self._waiting = []
-                return
-            for _, written in batch:
-                if not written.done():  # whoever waited may have gone
-                    written.set_result(None)
-
-    def _write(self, events: list[Event]) -> None:
-        rows = [(e.time, e.kind, e.person, e.message, json.dumps(e.body)) for e in events]
+    def _write(self, event: Event) -> None:
+        if self._failed:
+            raise sqlite3.OperationalError("an earlier event could not be written")
+        row = (event.time, event.kind, event.person, event.message, json.dumps(event.body))
+        self._failed = True  # until it is written: nothing may follow a gap
         with self._db:
             self._db.execute("BEGIN IMMEDIATE")
-            self._db.executemany("INSERT INTO events (time, kind, person, message, body) VALUES (?, ?, ?, ?, ?)", rows)
+            self._db.execute("INSERT INTO events (time, kind, person, message, body) VALUES (?, ?, ?, ?, ?)", row)
+        self._failed = False
