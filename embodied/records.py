@@ -37,6 +37,8 @@ from embodied.assets.json_file import (
 )
 from embodied.software import DISTRIBUTION
 
+CHOICES = (*typing.get_args(interface.Goal), *typing.get_args(interface.Action))
+"""Records that share a field with others, so that their name must be written."""
 WIDEST = 100.0
 """Largest radius of a goal, metres: that of a large building."""
 __all__ = ["RecordError", "from_json", "from_plain", "load_json", "parse", "parse_file", "read_json"]
@@ -90,7 +92,7 @@ def _plain(value: object) -> object:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         held = [(f, getattr(value, f.name)) for f in _fields(type(value))]
         fields = {f.name: _plain(x) for f, x in held if not f.metadata.get("unless_default") or x != f.default}
-        return {"is": type(value).__name__, **fields} if type(value) in _choices() else fields
+        return {"is": type(value).__name__, **fields} if type(value) in CHOICES else fields
     if isinstance(value, enum.Enum):
         return value.value
     if isinstance(value, np.ndarray):
@@ -107,12 +109,6 @@ def _plain(value: object) -> object:
 @functools.cache
 def _fields(kind: type) -> tuple[dataclasses.Field, ...]:
     return dataclasses.fields(kind)
-
-
-@functools.cache
-def _choices() -> tuple[type, ...]:
-    """Records that share a field with others, so that their name must be written."""
-    return (*typing.get_args(interface.Goal), *typing.get_args(interface.Action))
 
 
 def _angles(turn: int, tilt: int) -> str | None:

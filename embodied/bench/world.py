@@ -17,7 +17,7 @@ from embodied.datasets.store import StoredPlace
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
-from embodied.interface import Ask, Intention, Move, Observation, Task
+from embodied.interface import Action, Ask, Intention, Move, Observation, Task
 from embodied.kinds.task_kind import EnvInputs, TaskInputs, kind_named
 from embodied.language.plain_language import PlainLanguage
 from embodied.light.baking.house import bake_all, forget, lightings_of
@@ -144,13 +144,11 @@ def walk(env: HelpEnv, tasks: list[Task]) -> tuple[int, int]:
         o: Observation | None = env.reset(task)
         while o is not None:
             help_wanted = o.can_ask and o.time % 5 == 4 and o.time_on_task
-            action = Ask(o.can_ask[0] if o.can_ask[0] is Intention.HELP else o.can_ask[-1]) if help_wanted else _move(o)
+            choice = o.time % len(o.candidates)
+            action: Action = Move(choice if o.candidates.allowed[choice] else 1)
+            if help_wanted:
+                action = Ask(o.can_ask[0] if o.can_ask[0] is Intention.HELP else o.can_ask[-1])
             requests += isinstance(action, Ask)
             o = env.step(action)
             steps += 1
     return steps, requests
-
-
-def _move(o: Observation) -> Move:
-    choice = o.time % len(o.candidates)
-    return Move(choice if o.candidates.allowed[choice] else 1)

@@ -12,7 +12,6 @@ import argparse
 import functools
 import importlib.util
 import json
-import os
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -93,7 +92,10 @@ def run(args: PeopleStudyOptions) -> None:
         show(args, facts, as_text(facts))
         return
     links = opened.links(address, args.invitations or 0)
-    write_secret(out / "links.json", json.dumps(links, indent=1))
+    secrets = out / "links.json"
+    secrets.unlink(missing_ok=True)
+    secrets.touch(0o600)  # only its owner can read it
+    secrets.write_text(json.dumps(links, indent=1) + "\n", encoding="utf-8")
     if args.host not in LOOPBACKS:
         note(f"listening on {args.host}: whoever reaches this machine can connect; without TLS, answers can be read")
     few = {k: v if len(v) <= 3 else [*v[:3], f"... {len(v)} in {out / 'links.json'}"] for k, v in links.items() if v}
@@ -172,10 +174,3 @@ def agents_of(folder: Path, client: Callable[[], Client]) -> Mapping[str, AgentM
         return LanguageModelAgent(client())
 
     return {**POLICIES, "shipped": shipped, "llm": model}
-
-
-def write_secret(path: Path, text: str) -> None:
-    """Write a file that only its owner can read."""
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-    with os.fdopen(handle, "w", encoding="utf-8") as f:
-        f.write(text + "\n")

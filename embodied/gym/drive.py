@@ -84,10 +84,10 @@ class DriveEnv(LiveEnv):
         return self.driving.look(), {"world": self.driving.world.name, "request": self.driving.goal.request}
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        outcome = self.driving.step(action)
-        terminated, truncated = outcome.ended in ("reached", "said"), outcome.ended == "limit"
-        info: dict[str, Any] = {**outcome.facts, "is_success": outcome.facts["success"] > 0}
-        return self.driving.look(), outcome.reward, terminated, truncated, info
+        reward, facts = self.driving.step(action)
+        ended = self.driving.ended
+        info: dict[str, Any] = {**facts, "is_success": facts["success"] > 0}
+        return self.driving.look(), reward, ended in ("reached", "said"), ended == "limit", info
 
     def _picture(self) -> np.ndarray:
         return self.driving.seen.renderer.rgb(self.driving.camera(), VIEW)

@@ -129,17 +129,6 @@ def driven_task(name: str) -> DrivenTask:
     return record_named(name, DRIVEN_TASKS, DrivenTask, "", ())
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """Outcome of one command."""
-
-    reward: float
-    ended: str | None
-    """'reached', 'said' or 'limit'; None while it goes on."""
-    facts: Mapping[str, float]
-    """success, spl, collisions, metres, seconds and distance_to_goal, since the episode began."""
-
-
 class Driving:
     """Owns the physics and the pictures of some houses, and plays one episode at a time."""
 
@@ -185,10 +174,15 @@ class Driving:
         self.collisions: list[str] = []
         self.touched = False
         self.ended: str | None = None
+        """'reached', 'said' or 'limit'; None while it goes on."""
         self._wide: DrivingWays | None = None
 
-    def step(self, action: Sequence[float] | np.ndarray) -> Outcome:
-        """Hold a command: `settings.numbers` numbers from -1 to 1. SPL is as (4.17), of metres (docs/sources.md, S125).
+    def step(self, action: Sequence[float] | np.ndarray) -> tuple[float, dict[str, float]]:
+        """Hold a command: `settings.numbers` numbers from -1 to 1.
+
+        Returns:
+          The reward; and success, spl (as 4.17, of metres; docs/sources.md, S125), collisions, metres, seconds and
+          distance_to_goal, since the episode began.
 
         Raises:
           ValueError: another number of numbers, or something that is none.
@@ -218,7 +212,7 @@ class Driving:
         reward = trajectory.success - price + PER_METRE * (before - self._left)
         facts = {"success": trajectory.success, "spl": trajectory.spl}
         facts |= {"collisions": float(len(self.collisions)), "metres": self.metres, "seconds": self.seconds}
-        return Outcome(reward, self.ended, {**facts, "distance_to_goal": self._left})
+        return reward, {**facts, "distance_to_goal": self._left}
 
     def trajectory(self) -> Trajectory:
         """The way since the last reset, as it is judged."""

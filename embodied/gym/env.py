@@ -311,18 +311,6 @@ def _view(world: Place, pose: Pose) -> Image.Image:
     return Image.fromarray(world.panorama(pose.node).view_rgb(pose.yaw, pose.pitch, VIEW_ANGLE, size=VIEW))
 
 
-@dataclass(frozen=True, eq=False)
-class SharedResources:
-    """Everything that environments of one batch share: houses, tasks, assistants, decoded panoramas."""
-
-    make_env: Callable[[], HelpEnv]
-    tasks: Sequence[Task]
-    sensor: Sensor
-    layout: SpaceLayout
-    opened: Sequence[World]
-    """Whoever uses them closes them."""
-
-
 def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGymEnv:
     """The environment of a kind of task over a data set, or over one generated and lit flat without `data`.
 
@@ -338,9 +326,7 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGy
     """
     own = {name: options.pop(name) for name in OWN if name in options}
     check_options(render_mode, **own)
-    shared = open_resources(kind, **options)
-    how: dict[str, Any] = {"layout": shared.layout, "render_mode": render_mode, "opened": shared.opened, **own}
-    return HelpGymEnv(shared.make_env, shared.tasks, shared.sensor, **how)
+    return HelpGymEnv(**open_resources(kind, **options), render_mode=render_mode, **own)
 
 
 @dataclass(frozen=True, eq=False)
@@ -360,8 +346,9 @@ class EnvironmentSettings(PlaygroundSettings):
     layout: SpaceLayout | None = None
 
 
-def open_resources(kind: str, **settings: Any) -> SharedResources:
-    """Everything that environments of a kind of task share; `settings` are fields of EnvironmentSettings.
+def open_resources(kind: str, **settings: Any) -> dict[str, Any]:
+    """Everything that environments of one batch share, as arguments of HelpGymEnv: houses, tasks, assistants, decoded
+    panoramas; `settings` are fields of EnvironmentSettings.
 
     Raises:
       ValueError: unknown `observations`, or pixels where there are none.
@@ -373,7 +360,8 @@ def open_resources(kind: str, **settings: Any) -> SharedResources:
     play = split_playground(kind, data, wanted.split, wanted) if data else flat_playground(kind, wanted.seed, wanted)
     layout = wanted.layout or SpaceLayout.of(kind_named(kind), wanted.rules)
     opened = () if wanted.worlds is not None else [w for w in play.worlds.values() if isinstance(w, World)]
-    return SharedResources(play.make_env, play.tasks, _sensor_of(play, wanted), layout, opened)
+    how = {"sensor": _sensor_of(play, wanted), "layout": layout, "opened": opened}
+    return {"make_env": play.make_env, "tasks": play.tasks, **how}
 
 
 def _sensor_of(play: Playground, wanted: EnvironmentSettings) -> Sensor:

@@ -52,11 +52,10 @@ def make_vec(
     check_options(render_mode, **own)
     threads = options.pop("threads", None)
     shared = open_resources(kind, **options)
-
-    how: dict[str, Any] = {"layout": shared.layout, "render_mode": render_mode, **own}
-    one = functools.partial(HelpGymEnv, shared.make_env, shared.tasks, SensorSuite(), **how)
+    sensor, opened = shared.pop("sensor"), shared.pop("opened")
+    one = functools.partial(HelpGymEnv, sensor=SensorSuite(), render_mode=render_mode, **shared, **own)
     slots = in_step(one, num_envs, max_episode_steps)
-    return SharedSyncVectorEnv(slots, shared.sensor, threads=threads, opened=shared.opened)
+    return SharedSyncVectorEnv(slots, sensor, threads=threads, opened=opened)
 
 
 def in_step(make_one: Callable[[], gym.Env[Any, Any]], count: int, max_episode_steps: int | None) -> SyncVectorEnv:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -63,11 +62,8 @@ class ResultsWriter:
 
 def append_line(path: Path, record: object) -> None:
     """Add one record to a JSON Lines file, in one write."""
-    handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
-    try:
-        os.write(handle, (to_json(record) + "\n").encode())
-    finally:
-        os.close(handle)
+    with open(path, "ab", buffering=0) as file:
+        file.write((to_json(record) + "\n").encode())
 
 
 def judgement(sessions: Sessions, event: Event) -> Judgement:
