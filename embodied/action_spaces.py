@@ -55,10 +55,9 @@ class PanoramicMoves:
 
     def at(self, world: Place, pose: Pose) -> Reach:
         key = (world.house.name, pose.node, pose.turn)
-        reach = self._reach.get(key)
-        if reach is None:
-            reach = self._reach[key] = panoramic_reach(world.graph, pose)
-        return reach
+        if key not in self._reach:
+            self._reach[key] = panoramic_reach(world.graph, pose)
+        return self._reach[key]
 
 
 class MonocularMoves:
@@ -73,10 +72,9 @@ class MonocularMoves:
 
     def at(self, world: Place, pose: Pose) -> Reach:
         key = (world.house.name, pose)
-        reach = self._reach.get(key)
-        if reach is None:
-            reach = self._reach[key] = monocular_reach(world.graph, pose)
-        return reach
+        if key not in self._reach:
+            self._reach[key] = monocular_reach(world.graph, pose)
+        return self._reach[key]
 
 
 def directions(graph: NavGraph, node: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -106,9 +104,8 @@ def panoramic_reach(graph: NavGraph, pose: Pose) -> Reach:
     bearing = wrap(yaw - pose.yaw)
     order = bearing_order(bearing, nodes)
     view = nearest_views(yaw, pitch)[order]
-    candidates = Candidates(
-        bearing[order].astype(np.float32), pitch[order].astype(np.float32), view, np.ones(len(nodes), dtype=bool)
-    )
+    angles = (bearing[order].astype(np.float32), pitch[order].astype(np.float32))
+    candidates = Candidates(*angles, view, np.ones(len(nodes), dtype=bool))
     poses = tuple(Pose(int(j), int(v) % TURNS, int(v) // TURNS - 1) for j, v in zip(nodes[order], view))
     return candidates, poses
 

@@ -95,12 +95,8 @@ def _is_same(handle: int, path: Path) -> bool:
 
 
 def _myself() -> dict[str, object]:
-    return {
-        "pid": os.getpid(),
-        "host": socket.gethostname(),
-        "since": time.strftime("%Y-%m-%d %H:%M:%S"),
-        "command": " ".join(sys.argv)[:500],
-    }
+    since, command = time.strftime("%Y-%m-%d %H:%M:%S"), " ".join(sys.argv)[:500]
+    return {"pid": os.getpid(), "host": socket.gethostname(), "since": since, "command": command}
 
 
 def _holder(path: Path) -> str:

@@ -151,9 +151,8 @@ def blueprint_of(house: House, episode: Episode, seen: PictureSettings | None = 
     rows += [rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")] if dialogue else []
     right = rrb.Vertical(*rows, row_shares=[5, 3, 2, 3][: len(rows)])
     body, *others = (TextLogColumn(kind, visible=kind == "Body") for kind in ("Body", "EntityPath", "LogLevel"))
-    events = rrb.TextLogView(
-        origin="/events", name="Events", columns=rrb.archetypes.TextLogColumns(text_log_columns=[body, *others])
-    )
+    columns = rrb.archetypes.TextLogColumns(text_log_columns=[body, *others])
+    events = rrb.TextLogView(origin="/events", name="Events", columns=columns)
     below = rrb.Horizontal(*plots, events, column_shares=[*[2] * len(plots), 3])
     left = rrb.Vertical(world, below, row_shares=[3, 1])
     return rrb.Blueprint(
@@ -169,16 +168,11 @@ def _house_view(house: House) -> rrb.Spatial3DView:
     corners = np.array([c for r in house.rooms for c in r.polygon])
     low, high = corners.min(axis=0), corners.max(axis=0)
     centre, span = (low + high) / 2, float(max(high - low))
-    return rrb.Spatial3DView(
-        origin="/",
-        name="House",
-        contents=["+ /house/**", "+ /graph/**", "+ /agent/**", "+ /task/**", "+ /people/**"],
-        eye_controls=rrb.EyeControls3D(
-            position=(centre[0], centre[1] - 0.75 * span, 1.05 * span), look_target=(*centre, 0.0), eye_up=(0, 0, 1)
-        ),
-        background=(245, 246, 248),
-        line_grid=False,
-    )
+    position, target = (centre[0], centre[1] - 0.75 * span, 1.05 * span), (*centre, 0.0)
+    eye = rrb.EyeControls3D(position=position, look_target=target, eye_up=(0, 0, 1))
+    contents = [f"+ /{part}/**" for part in ("house", "graph", "agent", "task", "people")]
+    how = {"eye_controls": eye, "background": (245, 246, 248), "line_grid": False}
+    return rrb.Spatial3DView(origin="/", name="House", contents=contents, **how)
 
 
 def _plots(probabilities: bool, cost: bool, *, budget: bool) -> list[rrb.View]:

@@ -131,19 +131,14 @@ def prices(s: Staged, catalogue: WithRobot, cache: Path) -> list[dict]:
         with one_core(), open_world(s.house, catalogue.catalogue, cache, pictures, graph=s.graph) as world:
             for body, parts in catalogue.bodies.items():
                 world.add(body, parts)
-            eye = np.array([x, y, 1.5]) + min(
-                (e - [x, y, 1.5] for e in world.graph.positions), key=lambda d: abs(np.linalg.norm(d) - LOOKED_FROM)
-            )
+            away = lambda e: abs(math.dist(e, (x, y, 1.5)) - LOOKED_FROM)
+            eye = min(world.graph.positions, key=away)
             yaw = math.atan2(y - eye[1], x - eye[0])
             for size in ((128, 128), (480, 640)):
-                took = {
-                    way: _milliseconds(world, at, functools.partial(world.camera, eye, yaw, -0.5, VIEW_ANGLE, size))
-                    for way, at in ways.items()
-                }
-                rows += [
-                    {"pictures": pictures, "size": size[1], "way": w, "ms": ms, "share": ms / took["at rest"]}
-                    for w, ms in took.items()
-                ]
+                draw = functools.partial(world.camera, eye, yaw, -0.5, VIEW_ANGLE, size)
+                took = {way: _milliseconds(world, at, draw) for way, at in ways.items()}
+                about = {"pictures": pictures, "size": size[1]}
+                rows += [{**about, "way": w, "ms": ms, "share": ms / took["at rest"]} for w, ms in took.items()]
     return rows
 
 

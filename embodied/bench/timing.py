@@ -77,13 +77,8 @@ def from_values(name: str, values: Sequence[float], unit: str) -> Measure:
 
 def machine() -> dict[str, object]:
     """Facts about the machine that the numbers were made on."""
-    return {
-        "cores": processors(),
-        "machine": platform.machine(),
-        "system": platform.platform(),
-        "python": platform.python_version(),
-        "load": [round(x, 2) for x in os.getloadavg()],
-    }
+    system = {"machine": platform.machine(), "system": platform.platform(), "python": platform.python_version()}
+    return {"cores": processors(), **system, "load": [round(x, 2) for x in os.getloadavg()]}
 
 
 def table(measures: Sequence[Measure]) -> str:

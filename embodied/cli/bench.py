@@ -57,11 +57,8 @@ def run(args: BenchOptions) -> None:
     for m in itertools.chain.from_iterable(lines[p]() for p in parts if p in lines):
         note(timing.table([m]).splitlines()[-1])
         measures.append(m)
-    facts: dict[str, Any] = {
-        "renderer": str(gl.info()) if gl.available() else "no OpenGL",
-        **timing.machine(),
-        "seed": args.seed,
-    }
+    renderer = str(gl.info()) if gl.available() else "no OpenGL"
+    facts: dict[str, Any] = {"renderer": renderer, **timing.machine(), "seed": args.seed}
     texts = [f"{facts['renderer']}; {facts['cores']} cores, {facts['system']}, seed {args.seed}"]
     facts["measures"] = [asdict(m) for m in measures]
     if measures:

@@ -9,6 +9,7 @@ writer says at the line how it is met.
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import itertools
 import json
@@ -166,12 +167,8 @@ def names_of(data: Dataset) -> list[str]:
 
 
 def _hanna(data: Dataset, root: Path) -> list[Path]:
-    home, files, words, numbers = root / "data" / "hanna", [], Words(), itertools.count(1)
-    for split in data.splits:
-        items = [_item(t, next(numbers), data.place(t.world)) for t in data.tasks(split)]
-        if split == "train":
-            words.update(w for i in items for w in i["instructions"][0].split())
-        files.append(_json(home / f"hanna_{split}.json", items))
+    home = root / "data" / "hanna"
+    files, words = _task_files(data, home, "hanna", _item)
     routes: dict[str, list[Item]] = {}
     for name in names_of(data):
         routes[scan_name(name)] = [_route(r, data.place(name).graph) for r in data.routes(name)]
@@ -188,6 +185,19 @@ def _hanna(data: Dataset, root: Path) -> list[Path]:
         write_lines(root / "data" / "accepted_objects.txt", objects),
         write_lines(root / "data" / "region_label.txt", region_lines()),
     ]
+
+
+def _task_files(
+    data: Dataset, home: Path, prefix: str, item: Callable[[Task, int, StoredPlace], Item]
+) -> tuple[list[Path], Words]:
+    """A file of every split, whose items are numbered through, and the words of the training instructions."""
+    files, words, numbers = [], Words(), itertools.count(1)
+    for split in data.splits:
+        items = [item(t, next(numbers), data.place(t.world)) for t in data.tasks(split)]
+        if split == "train":
+            words.update(w for i in items for w in i["instructions"][0].split())
+        files.append(_json(home / f"{prefix}_{split}.json", items))
+    return files, words
 
 
 def action_space(data: Dataset) -> dict[str, list[Item]]:
@@ -227,14 +237,9 @@ def _route(route: Route, graph: NavGraph) -> Item:
 
 def _vnla(data: Dataset, root: Path) -> list[Path]:
     """Tasks with rooms, or without where the data set names none."""
-    teacher, files, words, numbers = VnlaTeacher(), [], Words(), itertools.count(1)
     prefix = "asknav" if data.config.rooms else "noroom"
     home = root / "data" / prefix
-    for split in data.splits:
-        items = [_vnla_item(t, next(numbers), data.place(t.world), teacher) for t in data.tasks(split)]
-        if split == "train":
-            words.update(w for i in items for w in i["instructions"][0].split())
-        files.append(_json(home / f"{prefix}_{split}.json", items))
+    files, words = _task_files(data, home, prefix, functools.partial(_vnla_item, teacher=VnlaTeacher()))
     files += [
         _vocabulary(home / "train_vocab.txt", words),
         write_lines(home / "verbal_hard_vocab.txt", subgoal_words(merged=True)),

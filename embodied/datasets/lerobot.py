@@ -47,15 +47,9 @@ FPS = 2
 CAMERA = "observation.images.view"
 DEPTH = "observation.images.depth"
 EVENTS = "language_events"
-EVENT = pa.struct(
-    [
-        pa.field("role", pa.string(), nullable=False),
-        pa.field("content", pa.string()),
-        pa.field("style", pa.string()),
-        pa.field("camera", pa.string()),
-        pa.field("tool_calls", pa.list_(pa.json_() if hasattr(pa, "json_") else pa.string())),
-    ]
-)
+CALLS = pa.field("tool_calls", pa.list_(pa.json_() if hasattr(pa, "json_") else pa.string()))
+TEXTS = [pa.field(name, pa.string(), nullable=name != "role") for name in ("role", "content", "style", "camera")]
+EVENT = pa.struct([*TEXTS, CALLS])
 """Words at a frame: an assistant's are an 'interjection'."""
 NEAREST, FARTHEST, SHIFT, CODES = 0.01, 10.0, 3.5, 4095
 """Depth videos: metres of the least and the largest code, metres added before the logarithm, the largest code."""
@@ -292,22 +286,11 @@ class Writer:
             counts = _histogram(pictures, video.depth)
             numbers[video.key] = _statistics_of_counts(counts, n, video.depth)
             self._counts[k] += counts
-        self._episodes.append(
-            {
-                "episode_index": number,
-                "tasks": list(dict.fromkeys(words)),
-                "length": n,
-                "dataset_from_index": self._steps,
-                "dataset_to_index": self._steps + n,
-                "data/chunk_index": 0,
-                "data/file_index": 0,
-                "meta/episodes/chunk_index": 0,
-                "meta/episodes/file_index": 0,
-                **where,
-                **facts,
-                **{f"stats/{name}/{what}": v for name, values in numbers.items() for what, v in values.items()},
-            }
-        )
+        row = {"episode_index": number, "tasks": list(dict.fromkeys(words)), "length": n}
+        row |= {"dataset_from_index": self._steps, "dataset_to_index": self._steps + n}
+        row |= {f"{part}/{index}": 0 for part in ("data", "meta/episodes") for index in ("chunk_index", "file_index")}
+        stats = {f"stats/{name}/{what}": v for name, values in numbers.items() for what, v in values.items()}
+        self._episodes.append({**row, **where, **facts, **stats})
         self._rows.append(whole)
         self._said += replies
         self._steps += n
@@ -331,9 +314,8 @@ class Writer:
             statistics[video.key] = _statistics_of_counts(counts, self._steps, video.depth)
         write_json(self._folder / "meta" / "stats.json", statistics, indent=1)
         _save(self._folder / "meta" / "tasks.parquet", _table_of_tasks(list(self._tasks)))
-        _save(
-            self._folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet", pa.Table.from_pylist(self._episodes)
-        )
+        table = pa.Table.from_pylist(self._episodes)
+        _save(self._folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet", table)
         write_json(self._folder / "meta" / "info.json", self._info(robot), indent=1)
         counted = f"{len(self._episodes)} episodes ({self._steps} steps)"
         write_bytes(self._folder / "README.md", filled(card, data, COUNT=counted).encode())
@@ -345,21 +327,11 @@ class Writer:
             dtype = DTYPES[kind.value_type if names else kind]
             features[name] = {"dtype": dtype, "shape": [len(names)] if names else [1], "names": names and list(names)}
         features[EVENTS] = {"dtype": "language", "shape": [1], "names": None}
-        return {
-            "codebase_version": VERSION,
-            "robot_type": robot,
-            "total_episodes": len(self._episodes),
-            "total_frames": self._steps,
-            "total_tasks": len(self._tasks),
-            "chunks_size": CHUNK,
-            "data_files_size_in_mb": FILE_MB,
-            "video_files_size_in_mb": FILE_MB,
-            "fps": self._fps,
-            "splits": {"train": f"0:{len(self._episodes)}"},
-            "data_path": PATHS["data"],
-            "video_path": PATHS["video"],
-            "features": features,
-        }
+        episodes, size = len(self._episodes), {"data_files_size_in_mb": FILE_MB, "video_files_size_in_mb": FILE_MB}
+        about = {"codebase_version": VERSION, "robot_type": robot, "total_episodes": episodes}
+        about |= {"total_frames": self._steps, "total_tasks": len(self._tasks), "chunks_size": CHUNK, **size}
+        about |= {"fps": self._fps, "splits": {"train": f"0:{episodes}"}}
+        return {**about, "data_path": PATHS["data"], "video_path": PATHS["video"], "features": features}
 
 
 def _events(replies: Sequence[str]) -> pa.Array:

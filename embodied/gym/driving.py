@@ -216,13 +216,9 @@ class Driving:
 
     def trajectory(self) -> Trajectory:
         """The way since the last reset, as it is judged."""
-        return Trajectory(
-            rule=SuccessRule(self.goal.radius),
-            distances=np.array(self._distances),
-            lengths=np.array(self._lengths),
-            shortest=self.shortest,
-            stopped=self.ended in ("reached", "said"),
-        )
+        rule, stopped = SuccessRule(self.goal.radius), self.ended in ("reached", "said")
+        way = {"distances": np.array(self._distances), "lengths": np.array(self._lengths)}
+        return Trajectory(rule=rule, shortest=self.shortest, stopped=stopped, **way)
 
     @property
     def left(self) -> float:

@@ -278,14 +278,11 @@ class Simulator:
                 f"MatterSim: the camera of viewpoint {self._graphs.ids[row]} is turned; pictures are drawn of the "
                 "upright skyboxes of `embodied export` only; call setRenderingEnabled(False)"
             )
-        return draw(
-            self._graphs.scans[row],
-            self._graphs.ids[row],
-            motion.heading(agent),
-            motion.elevation(agent),
-            self._vfov,
-            (self._height, self._width),
+        place, angles = (
+            (self._graphs.scans[row], self._graphs.ids[row]),
+            (motion.heading(agent), motion.elevation(agent)),
         )
+        return draw(*place, *angles, self._vfov, (self._height, self._width))
 
 
 class ForkSimulator(Simulator):
