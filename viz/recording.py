@@ -254,8 +254,16 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
     eye = world.graph.positions[pose.node]
     turn = Rotation.from_matrix(camera_axes(pose.yaw, pose.pitch)).as_quat()
     recording.log("agent/camera", rr.Transform3D(translation=eye, quaternion=rr.Quaternion(xyzw=turn)))
-    frame = {"width": width, "height": height, "focal_length": float(height / 2 / np.tan(views.vfov / 2))}
-    shown = {"camera_xyz": rr.ViewCoordinates.RDF, "image_plane_distance": 0.6, "color": PALETTE["agent"]}
+    frame: dict[str, Any] = {
+        "width": width,
+        "height": height,
+        "focal_length": float(height / 2 / np.tan(views.vfov / 2)),
+    }
+    shown: dict[str, Any] = {
+        "camera_xyz": rr.ViewCoordinates.RDF,
+        "image_plane_distance": 0.6,
+        "color": PALETTE["agent"],
+    }
     recording.log("agent/camera/image", rr.Pinhole(**frame, **shown), ahead(panorama, pose, sizes, views.vfov))
     equirect = panorama.equirect(sizes.panorama)
     shift = round(pose.yaw / (2 * np.pi) * equirect.shape[1])

@@ -7,6 +7,7 @@ import socket
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -171,7 +172,7 @@ def _house_view(house: House) -> rrb.Spatial3DView:
     position, target = (centre[0], centre[1] - 0.75 * span, 1.05 * span), (*centre, 0.0)
     eye = rrb.EyeControls3D(position=position, look_target=target, eye_up=(0, 0, 1))
     contents = [f"+ /{part}/**" for part in ("house", "graph", "agent", "task", "people")]
-    how = {"eye_controls": eye, "background": (245, 246, 248), "line_grid": False}
+    how: dict[str, Any] = {"eye_controls": eye, "background": (245, 246, 248), "line_grid": False}
     return rrb.Spatial3DView(origin="/", name="House", contents=contents, **how)
 
 

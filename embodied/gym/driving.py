@@ -217,8 +217,8 @@ class Driving:
     def trajectory(self) -> Trajectory:
         """The way since the last reset, as it is judged."""
         rule, stopped = SuccessRule(self.goal.radius), self.ended in ("reached", "said")
-        way = {"distances": np.array(self._distances), "lengths": np.array(self._lengths)}
-        return Trajectory(rule=rule, shortest=self.shortest, stopped=stopped, **way)
+        distances, lengths = np.array(self._distances), np.array(self._lengths)
+        return Trajectory(rule=rule, distances=distances, lengths=lengths, shortest=self.shortest, stopped=stopped)
 
     @property
     def left(self) -> float:

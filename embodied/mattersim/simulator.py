@@ -278,11 +278,8 @@ class Simulator:
                 f"MatterSim: the camera of viewpoint {self._graphs.ids[row]} is turned; pictures are drawn of the "
                 "upright skyboxes of `embodied export` only; call setRenderingEnabled(False)"
             )
-        place, angles = (
-            (self._graphs.scans[row], self._graphs.ids[row]),
-            (motion.heading(agent), motion.elevation(agent)),
-        )
-        return draw(*place, *angles, self._vfov, (self._height, self._width))
+        place, size = (self._graphs.scans[row], self._graphs.ids[row]), (self._height, self._width)
+        return draw(*place, motion.heading(agent), motion.elevation(agent), self._vfov, size)
 
 
 class ForkSimulator(Simulator):
