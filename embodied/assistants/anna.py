@@ -66,13 +66,8 @@ class Anna:
         best = home.best(node, goals)
         route = best[int(rng.integers(len(best)))] if len(best) > 1 else best[0]
         depart, goal = home.departure(route.path, goals)
-        subtask = Subtask(
-            route.id,
-            depart,
-            start=Pose(route.path[0], route.turn, route.tilt),
-            goal=goal,
-            path=route.path[: route.path.index(depart) + 1],
-        )
+        start, path = Pose(route.path[0], route.turn, route.tilt), route.path[: route.path.index(depart) + 1]
+        subtask = Subtask(route.id, depart, start=start, goal=goal, path=path)
         return Reply(text=route.instruction, image=Viewpoint(name, depart), subtask=subtask)
 
 

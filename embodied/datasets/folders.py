@@ -213,13 +213,9 @@ def action_space(data: Dataset) -> dict[str, list[Item]]:
 
 def _item(task: Task, number: int, place: StoredPlace) -> Item:
     ids, graph = place.graph.ids, place.graph
-    return {
-        "path_id": number,
-        "scan": scan_name(task.world),
-        "heading": heading(task.start),
-        "paths": [[ids[v] for v in graph.path(task.start.node, g)] for g in task.goal_nodes],
-        "instructions": [tokenised(task.request)],
-    }
+    paths = [[ids[v] for v in graph.path(task.start.node, g)] for g in task.goal_nodes]
+    about = {"path_id": number, "scan": scan_name(task.world), "heading": heading(task.start)}
+    return {**about, "paths": paths, "instructions": [tokenised(task.request)]}
 
 
 def _route(route: Route, graph: NavGraph) -> Item:

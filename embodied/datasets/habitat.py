@@ -173,27 +173,16 @@ def write_vlnce(
     episodes, experts = [], {}
     for e, trajectory in walked:
         tokens = [number[w] for w in tokenised(e.instruction).split()][:INSTRUCTION_TOKENS]
-        episodes.append(
-            {
-                "episode_id": int(e.id) if e.id.isdecimal() else e.id,
-                "trajectory_id": e.trajectory or e.id,
-                "scene_id": f"embodied/{e.world}/{e.world}.glb",
-                "start_position": to_habitat(e.start),
-                "start_rotation": rotation_of(e.yaw),
-                "info": {"geodesic_distance": trajectory.shortest},
-                "goals": [{"position": to_habitat(a.position), "radius": e.radius} for a in e.goals],
-                "instruction": {
-                    "instruction_text": e.instruction,
-                    "instruction_tokens": tokens + [0] * (INSTRUCTION_TOKENS - len(tokens)),
-                },
-                "reference_path": [to_habitat(p) for p in e.reference],
-            }
-        )
-        experts[e.id] = {
-            "locations": [to_habitat(p) for p in e.expert],
-            "forward_steps": sum(a == 1 for a in trajectory.actions),
-            "actions": list(trajectory.actions),
-        }
+        filled = tokens + [0] * (INSTRUCTION_TOKENS - len(tokens))
+        about: dict[str, Any] = {"episode_id": int(e.id) if e.id.isdecimal() else e.id}
+        about |= {"trajectory_id": e.trajectory or e.id, "scene_id": f"embodied/{e.world}/{e.world}.glb"}
+        about |= {"start_position": to_habitat(e.start), "start_rotation": rotation_of(e.yaw)}
+        about["info"] = {"geodesic_distance": trajectory.shortest}
+        about["goals"] = [{"position": to_habitat(a.position), "radius": e.radius} for a in e.goals]
+        about["instruction"] = {"instruction_text": e.instruction, "instruction_tokens": filled}
+        episodes.append({**about, "reference_path": [to_habitat(p) for p in e.reference]})
+        steps, locations = list(trajectory.actions), [to_habitat(p) for p in e.expert]
+        experts[e.id] = {"locations": locations, "forward_steps": steps.count(1), "actions": steps}
     vocabulary: dict[str, Any] = {"word_list": word_list, "word2idx_dict": number, "itos": word_list, "stoi": number}
     vocabulary |= {"num_vocab": len(word_list), "UNK_INDEX": 1, "PAD_INDEX": 0}
     home = Path(folder) / split
@@ -260,15 +249,11 @@ def read_vlnce(path: Path) -> list[ContinuousEpisode]:
         text = _field(_field(item, "instruction", dict, "it"), "instruction_text", str, "its instruction")
         if not places:
             raise ValueError(f"it should have goals, got {shown(places)}")
-        return ContinuousEpisode(
-            *_begun(item),
-            text,
-            tuple(NavigationGoal(from_habitat(g["position"])) for g in places),
-            float(places[0].get("radius") or 3.0),
-            tuple(from_habitat(p) for p in item.get("reference_path") or ()),
-            tuple(from_habitat(p) for p in experts.get(str(item["episode_id"]), {"locations": ()})["locations"]),
-            trajectory=str(item.get("trajectory_id", "")),
-        )
+        goals, radius = tuple(NavigationGoal(from_habitat(g["position"])) for g in places), places[0].get("radius")
+        expert = experts.get(str(item["episode_id"]), {"locations": ()})["locations"]
+        reference, passed = (tuple(map(from_habitat, way)) for way in (item.get("reference_path") or (), expert))
+        more: dict[str, Any] = {"radius": float(radius or 3.0), "trajectory": str(item.get("trajectory_id", ""))}
+        return ContinuousEpisode(*_begun(item), text, goals, reference=reference, expert=passed, **more)
 
     return _episodes(path, _read(path), episode, "VLN-CE")
 

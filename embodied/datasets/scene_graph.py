@@ -13,7 +13,7 @@ import shapely
 
 from embodied.assets.cache import atomic_path, write_bytes, write_json
 from embodied.errors import UnableError
-from embodied.house.house import House, Placement
+from embodied.house.house import House
 from embodied.house.moment import WIDEST
 from embodied.house.shapes import footprint
 from embodied.navigation.graph import NavGraph
@@ -49,13 +49,8 @@ def scene_graph(house: House, graph: NavGraph) -> dict[str, Any]:
         nodes.append({"id": p.id, "layer": "furniture" if p.parent is None else "object", **facts})
     for name, position in zip(graph.ids, graph.positions.tolist(), strict=True):
         nodes.append({"id": name, "layer": "place", "position": position})
-    return {
-        "house": house.name,
-        "seed": house.seed,
-        "digest": house.digest,
-        "nodes": nodes,
-        "edges": [*_edges(house, graph)],
-    }
+    about = {"house": house.name, "seed": house.seed, "digest": house.digest}
+    return {**about, "nodes": nodes, "edges": [*_edges(house, graph)]}
 
 
 def _middle(house: House) -> list[float]:
@@ -72,9 +67,10 @@ def _edges(house: House, graph: NavGraph) -> Iterator[dict[str, Any]]:
     for p in house.placements:
         if p.parent is None:
             yield edge(p.room, p.id, "contains")
-        else:
+        else:  # in is what lies inside, as books on a shelf below the top
             carrier = house.placement_by_id[p.parent]
-            yield edge(p.id, p.parent, "on" if is_on_top(p, carrier) else "in")
+            on_top = p.position[2] >= carrier.position[2] + 0.9 * carrier.size[2]
+            yield edge(p.id, p.parent, "on" if on_top else "in")
     standing = [p for p in house.placements if p.parent is None and p.size[2] > 0.03]
     outlines = {p.id: footprint(p) for p in standing}
     for a, b in itertools.combinations(standing, 2):
@@ -88,11 +84,6 @@ def _edges(house: House, graph: NavGraph) -> Iterator[dict[str, Any]]:
         yield edge(room_id, name, "contains")
     for (a, b), length in zip(graph.edges.tolist(), graph.lengths.tolist(), strict=True):
         yield edge(graph.ids[a], graph.ids[b], "walk", length=length)
-
-
-def is_on_top(p: Placement, carrier: Placement) -> bool:
-    """True for what rests on the top of its carrier, False for what is inside, as books on a shelf below the top."""
-    return p.position[2] >= carrier.position[2] + 0.9 * carrier.size[2]
 
 
 def write_spark_dsg(facts: dict[str, Any], path: Path) -> None:

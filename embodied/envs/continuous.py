@@ -10,6 +10,7 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -258,18 +259,14 @@ class ContinuousEnv:
         poses, first = np.array(self._poses, float), min(1, self.steps)
         positions = np.column_stack([poses[:, :2], np.full(len(poses), self.floor)])
         metres = np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))
+        way: dict[str, Any] = {"positions": positions, "yaws": poses[:, 2], "pitches": poses[:, 3].astype(int)}
         return ContinuousTrajectory(
             rule=SuccessRule(self.episode.radius, strict=True),
             distances=np.array(self._distances[first:]),
             lengths=metres if self.steps else np.zeros(1),
             shortest=self._distances[0],
             stopped=self._actions[-1:] == [HabitatAction.STOP],
-            episode=self.episode,
-            positions=positions,
-            yaws=poses[:, 2],
-            pitches=poses[:, 3].astype(int),
-            actions=tuple(self._actions),
-            collisions=self.collisions,
+            **{**way, "actions": tuple(self._actions), "collisions": self.collisions, "episode": self.episode},
         )
 
 
@@ -322,9 +319,8 @@ def seen_from(house: House, ground: FloorWays, object_class: str, reach: float) 
         near = (footprint_distance(p, ground.xy) <= reach) & (ground.room_of_cell == p.room)
         views = tuple((float(x), float(y), floor) for x, y in ground.xy[near])
         if views:
-            goals.append(
-                NavigationGoal((float(p.position[0]), float(p.position[1]), float(p.position[2])), views, p.id)
-            )
+            x, y, z = (float(v) for v in p.position)
+            goals.append(NavigationGoal((x, y, z), views, p.id))
     return tuple(goals)
 
 

@@ -231,15 +231,9 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
 
     def _words(self) -> dict[str, Any]:
         o = self._o
-        return {
-            "request": self._env.task.request,
-            "instruction": o.instruction,
-            "candidates": tuple(
-                {"action": k, "heading": float(o.candidates.bearing[k]), "text": direction_of(o, k)}
-                for k in range(len(o.candidates))
-                if o.candidates.allowed[k]
-            ),
-        }
+        words = lambda k: {"action": k, "heading": float(o.candidates.bearing[k]), "text": direction_of(o, k)}
+        candidates = tuple(words(int(k)) for k in np.flatnonzero(o.candidates.allowed))
+        return {"request": self._env.task.request, "instruction": o.instruction, "candidates": candidates}
 
     def _encoded(self, o: Observation) -> dict[str, Any]:
         return encode(o, self._sensor, self._layout)

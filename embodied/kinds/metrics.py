@@ -135,11 +135,8 @@ def ndtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph, rad
 
 def sdtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph, radius: float = 3.0) -> float:
     """nDTW if the ends are within the radius, else 0 (docs/sources.md, S7)."""
-    return (
-        ndtw(path, reference, graph, radius)
-        if SuccessRule(radius).near(graph.distance[path[-1], reference[-1]])
-        else 0.0
-    )
+    near = SuccessRule(radius).near(graph.distance[path[-1], reference[-1]])
+    return ndtw(path, reference, graph, radius) if near else 0.0
 
 
 def without_repeats(nodes: tuple[int, ...]) -> tuple[int, ...]:

@@ -91,16 +91,10 @@ def action_list(graph: NavGraph, node: int, bin_: int) -> list[dict[str, object]
     actions: list[dict[str, object]] = [{"relViewIndex": -1, "absViewIndex": bin_, "nextViewpointId": graph.ids[node]}]
     for k in bearing_order(relative, nodes):
         index = view_index(int(views[k]))
-        actions.append(
-            {
-                "relViewIndex": TURNS * (index // TURNS) + (index - bin_) % TURNS,
-                "absViewIndex": index,
-                "nextViewpointId": graph.ids[int(nodes[k])],
-                "rel_heading": float(relative[k]),
-                "rel_elevation": float(pitch[k]),
-                "distance": float(offset[k]),
-            }
-        )
+        turned = TURNS * (index // TURNS) + (index - bin_) % TURNS
+        views_to = {"relViewIndex": turned, "absViewIndex": index, "nextViewpointId": graph.ids[int(nodes[k])]}
+        angles = {"rel_heading": float(relative[k]), "rel_elevation": float(pitch[k]), "distance": float(offset[k])}
+        actions.append({**views_to, **angles})
     return actions
 
 
