@@ -469,7 +469,7 @@ def test_no_picture_is_decoded_that_declares_another_size_or_to_be_huge(kind, tm
             with pytest.raises(PanoramaFileError, match="no picture of its size"):
                 read(0)
     assert read_picture(tmp_path / "a.png") is None
-    pixels = lambda path: pictures._pixels(Path(path), pictures._bgra)
+    pixels = lambda path: pictures._pixels(Path(path), pictures.BGRA)
     for read in (colours.read_colours, model.load_texture, pixels):
         with pytest.raises((ValueError, OSError), match=r"a\.png"):
             read(str(tmp_path / "a.png"))

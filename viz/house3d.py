@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import fast_simplification
@@ -69,14 +70,9 @@ def light_meshes(parts: Sequence[Part], hidden: frozenset[str] = frozenset()) ->
 def log_house(recording: rr.RecordingStream, meshes: Sequence[LightMesh]) -> None:
     """Log the house once, for all times."""
     for mesh in meshes:
-        drawn = rr.Mesh3D(
-            vertex_positions=mesh.positions,
-            triangle_indices=mesh.faces,
-            vertex_colors=mesh.colors,
-            vertex_normals=mesh.normals,
-            vertex_texcoords=mesh.uv,
-            albedo_texture=mesh.picture,
-        )
+        shape: dict[str, Any] = {"vertex_positions": mesh.positions, "triangle_indices": mesh.faces}
+        shape |= {"vertex_normals": mesh.normals, "vertex_texcoords": mesh.uv}
+        drawn = rr.Mesh3D(**shape, vertex_colors=mesh.colors, albedo_texture=mesh.picture)
         recording.log(mesh.path, drawn, static=True)
 
 

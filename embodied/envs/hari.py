@@ -11,24 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from embodied import interface
 from embodied.action_spaces import Moves
 from embodied.assistants.descriptions import FREQUENT_SHARE, Describer, features_in_words
 from embodied.envs.base import HelpEnv, required
-from embodied.interface import (
-    Action,
-    Ask,
-    Assistant,
-    Description,
-    Episode,
-    Extras,
-    Intention,
-    Mode,
-    Move,
-    Observation,
-    Place,
-    Reply,
-    Stop,
-)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -52,11 +38,11 @@ class Costs:
         """The same for all four."""
         return cls(cost, cost, cost, cost)
 
-    def of(self, action: Action) -> float:
+    def of(self, action: interface.Action) -> float:
         """Cost of an action that does not end the episode; DONE on a sub-goal is free (4.3.4.4)."""
-        if isinstance(action, Move):
+        if isinstance(action, interface.Move):
             return self.do
-        return getattr(self, action.intention.value) if isinstance(action, Ask) else 0.0
+        return getattr(self, action.intention.value) if isinstance(action, interface.Ask) else 0.0
 
 
 @dataclass(frozen=True)
@@ -88,12 +74,12 @@ AS_PRINTED = HariRules()
 
 
 @dataclass(frozen=True)
-class HariExtras(Extras):
+class HariExtras(interface.Extras):
     """Observation of the agent besides what all kinds see: descriptions that it perceives or was told."""
 
-    state_description: Description
+    state_description: interface.Description
     """d^s."""
-    goal_descriptions: tuple[Description, ...]
+    goal_descriptions: tuple[interface.Description, ...]
     """The stack G^d, top last."""
 
     def lines(self, turn: int) -> tuple[str, ...]:
@@ -112,7 +98,7 @@ class HariTruth:
 @dataclass(frozen=True, slots=True)
 class StackedGoal:
     node: int
-    description: Description
+    description: interface.Description
     patience: int
     """Time steps left on it before it is dropped; unused for the main goal."""
 
@@ -127,8 +113,8 @@ class HariEnv(HelpEnv):
 
     def __init__(
         self,
-        worlds: Mapping[str, Place],
-        assistant: Assistant,
+        worlds: Mapping[str, interface.Place],
+        assistant: interface.Assistant,
         describer: Describer,
         *,
         costs: Costs = Costs(),
@@ -146,13 +132,13 @@ class HariEnv(HelpEnv):
         self._goals = [StackedGoal(goal, self._describer.sparse(self.world, goal, goal=True), 0)]  # G_1
         self._state = self._describer.sparse(self.world, self.pose.node)
 
-    def _replied(self, reply: Reply) -> None:
+    def _replied(self, reply: interface.Reply) -> None:
         """T_G and p_desp of 4.3.4.2 and 4.3.4.3."""
         description = required(reply.description, "description in the reply")
         self._tick()
-        if reply.intention is Intention.CUR:
+        if reply.intention is interface.Intention.CUR:
             self._state = description
-        elif reply.intention is Intention.GOAL:
+        elif reply.intention is interface.Intention.GOAL:
             top = self._goals[-1]
             self._goals[-1] = StackedGoal(top.node, description, top.patience)
         else:
@@ -185,16 +171,16 @@ class HariEnv(HelpEnv):
             self._goals.pop()
         deep = len(self._goals) > 1
         self.targets = (self._goals[-1].node,) if deep else self.task.goal_nodes
-        self.mode = Mode.SUB if deep else Mode.MAIN
+        self.mode = interface.Mode.SUB if deep else interface.Mode.MAIN
         if not deep:
             self.subtask = None
 
-    def _cost(self, action: Action) -> float:
-        if isinstance(action, Stop) and len(self._goals) == 1:
+    def _cost(self, action: interface.Action) -> float:
+        if isinstance(action, interface.Stop) and len(self._goals) == 1:
             return self.task_error(self.pose.node, self._goals[0].node)
         return self._costs.of(action)
 
-    def step(self, action: Action) -> Observation | None:
+    def step(self, action: interface.Action) -> interface.Observation | None:
         observation = super().step(action)
         if self.ended == "limit":
             error = self.task_error(self.task.start.node, self.task.goal_nodes[0])
@@ -215,7 +201,7 @@ class HariEnv(HelpEnv):
         return HariExtras(self._state, tuple(g.description for g in self._goals))
 
 
-def shaped_costs(episode: Episode, hops: np.ndarray) -> list[float]:
+def shaped_costs(episode: interface.Episode, hops: np.ndarray) -> list[float]:
     """c-tilde_t = c_t + Phi(s_{t+1}, g_{t+1}) - Phi(s_t, g_t), with Phi = 0 after the end (4.20).
 
     Args:

@@ -33,10 +33,9 @@ TILES = ((3, 0), (5, 1), (2, 3), (4, 1), (0, 1), (1, 2))
 """Face and quarter turns (counter-clockwise) of each tile."""
 WHERE = {face: (tile, turns) for tile, (face, turns) in enumerate(TILES)}
 """Tile and quarter turns of each face."""
-TURNED_BACK = {1: cv2.ROTATE_90_CLOCKWISE, 2: cv2.ROTATE_180, 3: cv2.ROTATE_90_COUNTERCLOCKWISE}
-"""The rotation that undoes so many quarter turns."""
 DEPTH_UNITS = 4000.0
 """Depth along the ray is kept in quarters of a millimetre; 0 where nothing is."""
+BGRA = functools.partial(colours, order="BGRA")
 RGB, DEPTH = "{}_skybox_small.jpg", "{}_skybox_depth_small.png"
 
 
@@ -49,25 +48,16 @@ def tiles_of(faces: np.ndarray) -> np.ndarray:
     return np.stack([np.rot90(faces[face], turns) for face, turns in TILES])
 
 
-def tile_of(strip: np.ndarray, tile: int) -> np.ndarray:
-    """(s, s, ...): one of the six tiles of a skybox, which lie beside each other.
+def write_face(strip: np.ndarray, face: int, to: np.ndarray) -> None:
+    """Write one of our faces, (s, s, ...), from its tile of a skybox, whose tiles lie beside each other.
 
     Raises:
       ValueError: the tiles are not square.
     """
-    height, width = strip.shape[:2]
+    (height, width), (tile, turns) = strip.shape[:2], WHERE[face]
     if width != 6 * height:
         raise ValueError(f"MatterSim: a skybox is six squares beside each other, got {width} x {height} pixels")
-    return strip[:, tile * height : (tile + 1) * height]
-
-
-def write_face(face: int, tile: np.ndarray, to: np.ndarray) -> None:
-    """Write one of our faces, (s, s, ...), from its tile."""
-    turns, tile = WHERE[face][1], tile.astype(to.dtype, copy=False)
-    if turns:
-        cv2.rotate(tile, TURNED_BACK[turns], dst=to)
-    else:
-        cv2.copyTo(tile, None, to)
+    to[...] = np.rot90(strip[:, tile * height : (tile + 1) * height], -turns)
 
 
 class Skyboxes:
@@ -88,9 +78,8 @@ class Skyboxes:
         Raises:
           ValueError: a picture is missing, or cannot be read.
         """
-        folder = skybox_folder(self.dataset, scan)
-        strip = _pixels(folder / RGB.format(viewpoint), _bgra)
-        return padded_rgba(len(strip), lambda k, to: write_face(k, tile_of(strip, WHERE[k][0]), to))
+        strip = _pixels(skybox_folder(self.dataset, scan) / RGB.format(viewpoint), BGRA)
+        return padded_rgba(len(strip), functools.partial(write_face, strip))
 
     def _distances(self, scan: str, viewpoint: str) -> np.ndarray:
         """`padded_plane` of a skybox's depth along the ray, uint16 DEPTH_UNITS.
@@ -99,7 +88,7 @@ class Skyboxes:
           ValueError: the picture is missing.
         """
         units = _pixels(skybox_folder(self.dataset, scan) / DEPTH.format(viewpoint), numbers)
-        return padded_plane(len(units), lambda k, to: write_face(k, tile_of(units, WHERE[k][0]), to), kind=np.uint16)
+        return padded_plane(len(units), functools.partial(write_face, units), kind=np.uint16)
 
     def rgb(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
@@ -149,10 +138,6 @@ def _pixels(path: Path, decode: Callable[[bytes], np.ndarray | None]) -> np.ndar
             "or call setRenderingEnabled(False)"
         )
     return picture
-
-
-def _bgra(data: bytes) -> np.ndarray | None:
-    return colours(data, "BGRA")
 
 
 FACES = "{}_skybox{}_sami.jpg"

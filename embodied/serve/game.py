@@ -9,28 +9,11 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from embodied import interface
 from embodied.action_spaces import PanoramicMoves
 from embodied.datasets.store import Dataset, SplitData
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.envs.continuous import NavMeshCache
-from embodied.interface import (
-    Action,
-    Agent,
-    Ask,
-    Assistant,
-    Episode,
-    Intention,
-    Move,
-    Observation,
-    Place,
-    Reply,
-    Situation,
-    Step,
-    Stop,
-    Task,
-    Thought,
-    act,
-)
 from embodied.kinds.plugins import made_by_name
 from embodied.policies.baselines import WITHOUT_LEARNING
 from embodied.records import from_plain, parse, to_json
@@ -40,8 +23,8 @@ from embodied.serve.store import Event
 from embodied.serve.study import LONGEST_TEXT, PERSON, StudyPart
 from embodied.serve.talk import Overheard, PathSpeaker, PracticeAgent, Relay, TalkEnv
 
-AgentMaker = Callable[[SplitData], Agent]
-AssistantMaker = Callable[[Assistant], Assistant]
+AgentMaker = Callable[[SplitData], interface.Agent]
+AssistantMaker = Callable[[interface.Assistant], interface.Assistant]
 """Puts an assistant in the place of the simulated one, which it is given."""
 POLICIES: Mapping[str, AgentMaker] = {
     name: functools.partial(lambda make, split: make(), make) for name, make in WITHOUT_LEARNING.items()
@@ -53,12 +36,12 @@ class Table:
     """All that the games of a part share: the places, the tasks, and who plays where no person does."""
 
     part: StudyPart
-    places: Mapping[str, Place]
-    tasks: Mapping[str, Task]
-    practice: Task
+    places: Mapping[str, interface.Place]
+    tasks: Mapping[str, interface.Task]
+    practice: interface.Task
     """Played before the first that counts; none of `tasks` where there are more."""
     make_env: Callable[[], tuple[HelpEnv, Relay]]
-    agent: Agent | None
+    agent: interface.Agent | None
     assistant: Any
     grounds: NavMeshCache = field(default_factory=NavMeshCache)
     """The floors to drive on."""
@@ -86,7 +69,7 @@ def set_table(
     tasks = [t if part.budget is None else dataclasses.replace(t, budget=part.budget) for t in split.tasks]
     if not tasks:
         raise ValueError(f"part {part.name!r}: the split {part.split!r} has no tasks")
-    agent: Agent | None = None
+    agent: interface.Agent | None = None
     if part.agent != PERSON:
         agent = agents[part.agent](split) if part.agent in agents else made_by_name(part.agent)
     moves, prices = PanoramicMoves(), {q.text: q.price for q in part.questions}
@@ -128,7 +111,7 @@ class Game:
     practice: bool
     begun: float
     """Seconds since 1970."""
-    task: Task
+    task: interface.Task
     seed: int
     said: list[dict[str, Any]] = field(default_factory=list)
     """The conversation: who ('agent', 'assistant'), text, picture (node or None)."""
@@ -144,19 +127,19 @@ class Game:
             self.relay = Relay()
             helped = self.table.part.assistant != "none"
             self.env: HelpEnv = TalkEnv(self.table.places, self.relay if helped else None, PanoramicMoves())
-            self.agent: Agent | None = None if "agent" in self.people else PracticeAgent()
+            self.agent: interface.Agent | None = None if "agent" in self.people else PracticeAgent()
             self.assistant: Any = None if "assistant" in self.people else PathSpeaker()
         else:
             self.env, self.relay = self.table.make_env()
             self.agent, self.assistant = self.table.agent, self.table.assistant
-        self.observation: Observation | None = self.env.reset(self.task, seed=self.seed)
+        self.observation: interface.Observation | None = self.env.reset(self.task, seed=self.seed)
         drives = self.table.part.moves == "drive" and "agent" in self.people
         self.drive = BrowserBody(self.env.world, self.task.start, self.table.grounds) if drives else None
         self.last_change = self.begun
-        self._steps: list[Step] = []
+        self._steps: list[interface.Step] = []
         self._asked_at = 0.0
-        self._asking: Thought | None = None
-        self._seen: list[tuple[Observation, Situation]] = [(self.observation, self.env.situation)]
+        self._asking: interface.Thought | None = None
+        self._seen: list[tuple[interface.Observation, interface.Situation]] = [(self.observation, self.env.situation)]
         self._memory: Any = None
         self._thought = 0
         self._rng = stream(self.seed, "policy", self.task.id)
@@ -175,14 +158,14 @@ class Game:
         return self.mover is not None and self.mover not in self.people
 
     @property
-    def episode(self) -> Episode:
+    def episode(self) -> interface.Episode:
         """The finished episode, with the seconds of its steps."""
         part = self.table.part
         names = [self.people.get("agent", part.agent), self.people.get("assistant", part.assistant)]
         return dataclasses.replace(self.env.episode(" with ".join(names)), steps=tuple(self._steps))
 
     @property
-    def situation(self) -> Situation:
+    def situation(self) -> interface.Situation:
         return self.env.situation
 
     def apply(self, event: Event) -> None:
@@ -201,10 +184,10 @@ class Game:
         elif event.kind == "answered":
             if self.question is None:
                 raise ActionError("nothing was asked")
-            reply = from_plain(Reply, event.body["reply"])
+            reply = from_plain(interface.Reply, event.body["reply"])
             self.relay.reply = reply
             question, self.question = self.question, None
-            self._step(Ask(question=question, thought=self._asking), self._asked_at)
+            self._step(interface.Ask(question=question, thought=self._asking), self._asked_at)
             picture = None if reply.image is None else reply.image.node
             seconds = event.time - self._asked_at
             self.said.append({"who": "assistant", "text": reply.text or "", "picture": picture, "seconds": seconds})
@@ -213,9 +196,9 @@ class Game:
                 raise ActionError("the assistant has not answered yet")
             thought = _thought_of(event)
             if event.kind != "moved":
-                self._step(Stop(thought), event.time)
+                self._step(interface.Stop(thought), event.time)
             elif self.drive is None:
-                self._step(Move(int(event.body["candidate"]), thought), event.time)
+                self._step(interface.Move(int(event.body["candidate"]), thought), event.time)
             else:
                 self._drive(self.drive, int(event.body["candidate"]), event.time)
         self.turn += 1
@@ -226,22 +209,22 @@ class Game:
         if self.question is not None:
             return "answered", {"reply": self._answer(self.question)}
         assert self.agent is not None, "a bot acts"
-        action: Action | None = None
+        action: interface.Action | None = None
         for seen, situation in self._seen[self._thought :]:
-            (action,), self._memory = act(self.agent, [seen], [situation], self._memory, rngs=[self._rng])
+            (action,), self._memory = interface.act(self.agent, [seen], [situation], self._memory, rngs=[self._rng])
         self._thought = len(self._seen)
         assert action is not None, "something new was seen"
         body = {} if action.thought is None else {"thought": parse(to_json(action.thought))}
-        if isinstance(action, Move):
+        if isinstance(action, interface.Move):
             return "moved", {"candidate": action.candidate, **body}
-        if isinstance(action, Ask):
+        if isinstance(action, interface.Ask):
             return "asked", {"question": action.question or "Can you help me?", **body}
         return "stopped", body
 
     def _answer(self, question: str) -> Any:
         rng = stream(self.seed, "assistant", self.task.id, self.env.time)
         asked = dataclasses.replace(self.env.situation, question=question)
-        reply = self.assistant.answer(asked, Intention.FREE, rng=rng)
+        reply = self.assistant.answer(asked, interface.Intention.FREE, rng=rng)
         return parse(to_json(reply))
 
     def _ask(self, question: str, time: float) -> None:
@@ -261,16 +244,16 @@ class Game:
         for node in self.situation.world.graph.path(self.env.pose.node, here)[1:]:
             if self.over:
                 break
-            self._step(Move(self.situation.candidate_nodes.index(node)), time)
+            self._step(interface.Move(self.situation.candidate_nodes.index(node)), time)
 
-    def _step(self, action: Action, time: float) -> None:
+    def _step(self, action: interface.Action, time: float) -> None:
         self.observation = self.env.step(action)
         self._steps.append(dataclasses.replace(self.env.last_step, seconds=round(time - self.begun, 3)))
         if self.observation is not None:
             self._seen.append((self.observation, self.env.situation))
 
 
-def _thought_of(event: Event) -> Thought | None:
+def _thought_of(event: Event) -> interface.Thought | None:
     """The thought of a bot when it acted; nothing where it did not say, and of people."""
     thought = event.body.get("thought")
-    return None if thought is None else from_plain(Thought, thought)
+    return None if thought is None else from_plain(interface.Thought, thought)

@@ -10,22 +10,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from embodied import interface
 from embodied.action_spaces import WORDS, MonocularMoves
-from embodied.interface import (
-    TURNS,
-    VIEWS,
-    Ask,
-    Episode,
-    Label,
-    Mode,
-    Move,
-    Place,
-    Pose,
-    Situation,
-    Stop,
-    Subtask,
-    Thought,
-)
 from embodied.navigation.graph import nearest
 
 ACTION = 1e-3
@@ -44,10 +30,10 @@ class MonocularPlan:
     shortest way in this action space may be longer than along the graph.
     """
 
-    def __init__(self, world: Place, moves: MonocularMoves) -> None:
+    def __init__(self, world: interface.Place, moves: MonocularMoves) -> None:
         nodes = len(world.graph.positions)
         self.distance = distance = np.asarray(world.graph.distance)
-        states = nodes * VIEWS
+        states = nodes * interface.VIEWS
         self.next = np.tile(np.arange(states)[:, None], (1, len(WORDS)))
         self.weight = np.full((states, len(WORDS)), np.inf)
         for state in range(states):
@@ -60,18 +46,18 @@ class MonocularPlan:
         there, weight = self.next[here, action], self.weight[here, action]
         self._backwards = csr_matrix((weight, (there, here)), shape=(states, states))
         self._cost: dict[tuple[int, ...], np.ndarray] = {}
-        self._cost_to: dict[Pose, np.ndarray] = {}
+        self._cost_to: dict[interface.Pose, np.ndarray] = {}
         self._actions: dict[tuple[int, ...], np.ndarray] = {}
         self._counts: dict[tuple[int, ...], np.ndarray] = {}
 
     def cost(self, goals: tuple[int, ...]) -> np.ndarray:
         """(states,) metres plus ACTION per action to the nearest of `goals`; inf where none can be reached."""
         if goals not in self._cost:
-            sources = [g * VIEWS + v for g in goals for v in range(VIEWS)]
+            sources = [g * interface.VIEWS + v for g in goals for v in range(interface.VIEWS)]
             self._cost[goals] = dijkstra(self._backwards, indices=sources, min_only=True)
         return self._cost[goals]
 
-    def action(self, pose: Pose, goals: tuple[int, ...]) -> int | None:
+    def action(self, pose: interface.Pose, goals: tuple[int, ...]) -> int | None:
         """Index into WORDS of the best move; None at a goal (stop)."""
         return None if pose.node in goals else int(self._best(goals)[state_of(pose)])
 
@@ -84,10 +70,10 @@ class MonocularPlan:
 
     def _known(self, cost: np.ndarray, goals: tuple[int, ...]) -> np.ndarray:
         """(states,) costs; where no goal can be reached, how far the nearest is along the graph, behind all others."""
-        behind = LOST + np.repeat(self.distance[:, list(goals)].min(axis=1), VIEWS)
+        behind = LOST + np.repeat(self.distance[:, list(goals)].min(axis=1), interface.VIEWS)
         return np.where(np.isfinite(cost), cost, behind)
 
-    def action_to(self, pose: Pose, end: Pose) -> int | None:
+    def action_to(self, pose: interface.Pose, end: interface.Pose) -> int | None:
         """Index into WORDS of the best move towards a pose, its angles included; None in it.
 
         On the way that `words` described it says the words themselves: what is best towards the end of a best way
@@ -100,14 +86,14 @@ class MonocularPlan:
         state = state_of(pose)
         return int(np.argmin(np.round(self.weight[state] + self._cost_to[end][self.next[state]], 9)))
 
-    def after(self, pose: Pose, words: Sequence[str]) -> Pose:
+    def after(self, pose: interface.Pose, words: Sequence[str]) -> interface.Pose:
         """The pose that `words` lead to."""
         for word in words:
             if word != "stop":
                 pose = pose_of(int(self.next[state_of(pose), WORDS.index(word)]))
         return pose
 
-    def words(self, pose: Pose, goals: tuple[int, ...], most: int) -> tuple[tuple[str, ...], Pose]:
+    def words(self, pose: interface.Pose, goals: tuple[int, ...], most: int) -> tuple[tuple[str, ...], interface.Pose]:
         """The next `most` teacher actions, ending with 'stop' if it comes, and the pose they lead to (4.1)."""
         words: list[str] = []
         while len(words) < most:
@@ -124,7 +110,7 @@ class MonocularPlan:
         if goals not in self._counts:
             cost = self.cost(goals)
             follow = self.next[np.arange(len(cost)), self._best(goals)]
-            arrived = np.isin(np.arange(len(cost)) // VIEWS, goals)
+            arrived = np.isin(np.arange(len(cost)) // interface.VIEWS, goals)
             lost, here = ~np.isfinite(cost), np.arange(len(cost))
             counts = np.ones(len(cost), dtype=np.int64)
             for _ in range(len(cost)):
@@ -136,7 +122,7 @@ class MonocularPlan:
             self._counts[goals] = np.where(lost, -1, counts)
         return self._counts[goals]
 
-    def count(self, pose: Pose, goals: tuple[int, ...]) -> int:
+    def count(self, pose: interface.Pose, goals: tuple[int, ...]) -> int:
         """Actions of the teacher from `pose`, the final stop included.
 
         Raises:
@@ -148,13 +134,13 @@ class MonocularPlan:
         return n
 
 
-def state_of(pose: Pose) -> int:
-    return pose.node * VIEWS + pose.view
+def state_of(pose: interface.Pose) -> int:
+    return pose.node * interface.VIEWS + pose.view
 
 
-def pose_of(state: int) -> Pose:
-    node, view = divmod(state, VIEWS)
-    return Pose(node, view % TURNS, view // TURNS - 1)
+def pose_of(state: int) -> interface.Pose:
+    node, view = divmod(state, interface.VIEWS)
+    return interface.Pose(node, view % interface.TURNS, view // interface.TURNS - 1)
 
 
 @dataclass(frozen=True)
@@ -171,7 +157,9 @@ class AskRules:
     """Rules in force, for the ablations (a and e; b to d)."""
 
 
-def ask_reason(situation: Situation, thought: Thought | None, rules: AskRules = AskRules()) -> str | None:
+def ask_reason(
+    situation: interface.Situation, thought: interface.Thought | None, rules: AskRules = AskRules()
+) -> str | None:
     """The first rule that says to ask, in the order of docs/sources.md, S50; None if none does.
 
     Args:
@@ -216,41 +204,43 @@ class VnlaTeacher:
         self.moves, self.rules = moves or MonocularMoves(), rules
         self._plans: dict[str, MonocularPlan] = {}
 
-    def plan(self, world: Place) -> MonocularPlan:
+    def plan(self, world: interface.Place) -> MonocularPlan:
         """The plan of a world, made on first use."""
         name = world.house.name
         if name not in self._plans:
             self._plans[name] = MonocularPlan(world, self.moves)
         return self._plans[name]
 
-    def words(self, world: Place, pose: Pose, goals: tuple[int, ...], most: int) -> tuple[tuple[str, ...], Pose]:
+    def words(
+        self, world: interface.Place, pose: interface.Pose, goals: tuple[int, ...], most: int
+    ) -> tuple[tuple[str, ...], interface.Pose]:
         """Its next `most` actions towards the nearest goal, 'stop' included, and the pose they lead to (4.1)."""
         return self.plan(world).words(pose, goals, most)
 
-    def label(self, situation: Situation, thought: Thought | None = None) -> Label:
-        return Label(self.reference(situation), ask_reason(situation, thought, self.rules) is not None)
+    def label(self, situation: interface.Situation, thought: interface.Thought | None = None) -> interface.Label:
+        return interface.Label(self.reference(situation), ask_reason(situation, thought, self.rules) is not None)
 
-    def reference(self, situation: Situation) -> Move | Stop:
+    def reference(self, situation: interface.Situation) -> interface.Move | interface.Stop:
         """The reference move."""
         s, plan = situation, self.plan(situation.world)
-        if s.mode is Mode.SUB and s.subtask is not None and s.subtask.start is not None:
+        if s.mode is interface.Mode.SUB and s.subtask is not None and s.subtask.start is not None:
             action = plan.action_to(s.pose, plan.after(s.subtask.start, s.subtask.words))
         else:
             action = plan.action(s.pose, s.targets)
-        return Stop() if action is None else Move(action)
+        return interface.Stop() if action is None else interface.Move(action)
 
-    def relabel(self, episode: Episode, world: Place) -> tuple[Label, ...]:
+    def relabel(self, episode: interface.Episode, world: interface.Place) -> tuple[interface.Label, ...]:
         """Labels of a finished episode; the thought at an Ask step is what its policy was about to do."""
-        labels: list[Label] = []
+        labels: list[interface.Label] = []
         trail: list[int] = []
         time = requests = 0
-        subtask: Subtask | None = None
+        subtask: interface.Subtask | None = None
         for step in episode.steps:
             if len(trail) <= time:
                 trail.append(step.pose.node)
             left = None if episode.budget is None else episode.budget - requests
             candidates, _ = self.moves.at(world, step.pose)
-            situation = Situation(
+            situation = interface.Situation(
                 world=world,
                 task=episode.task,
                 pose=step.pose,
@@ -265,8 +255,8 @@ class VnlaTeacher:
                 trail=tuple(trail),
             )
             label = self.label(situation, step.action.thought)
-            asked = isinstance(step.action, Ask)
-            labels.append(Label(None if asked else label.move, label.ask if step.can_ask else None))
+            asked = isinstance(step.action, interface.Ask)
+            labels.append(interface.Label(None if asked else label.move, label.ask if step.can_ask else None))
             subtask = subtask if step.reply is None else step.reply.subtask
             requests += asked
             time += not asked
