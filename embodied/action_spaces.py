@@ -12,23 +12,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from embodied import interface
 from embodied.geometry import wrap
-from embodied.interface import (
-    STEP,
-    TURNS,
-    VIEW_PITCHES,
-    VIEW_YAWS,
-    Action,
-    Candidates,
-    Close,
-    Episode,
-    Move,
-    Observation,
-    Open,
-    Place,
-    Pose,
-    Step,
-)
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
@@ -39,12 +24,12 @@ FIELD = math.radians(40)
 """Half the horizontal field in which 'forward' looks for a node: vfov 60 degrees times 640 / 480,
 halved, the linear rule of the Matterport3D simulator (docs/sources.md, S1)."""
 
-Reach = tuple[Candidates, tuple[Pose, ...]]
+Reach = tuple[interface.Candidates, tuple[interface.Pose, ...]]
 """The agent's knowledge of its moves, and the privileged pose that each leads to."""
 
 
 class Moves(Protocol):
-    def at(self, world: Place, pose: Pose) -> Reach: ...
+    def at(self, world: interface.Place, pose: interface.Pose) -> Reach: ...
 
 
 class PanoramicMoves:
@@ -53,7 +38,7 @@ class PanoramicMoves:
     def __init__(self) -> None:
         self._reach: dict[tuple[str, int, int], Reach] = {}
 
-    def at(self, world: Place, pose: Pose) -> Reach:
+    def at(self, world: interface.Place, pose: interface.Pose) -> Reach:
         key = (world.house.name, pose.node, pose.turn)
         if key not in self._reach:
             self._reach[key] = panoramic_reach(world.graph, pose)
@@ -68,9 +53,9 @@ class MonocularMoves:
     """
 
     def __init__(self) -> None:
-        self._reach: dict[tuple[str, Pose], Reach] = {}
+        self._reach: dict[tuple[str, interface.Pose], Reach] = {}
 
-    def at(self, world: Place, pose: Pose) -> Reach:
+    def at(self, world: interface.Place, pose: interface.Pose) -> Reach:
         key = (world.house.name, pose)
         if key not in self._reach:
             self._reach[key] = monocular_reach(world.graph, pose)
@@ -88,8 +73,8 @@ def directions(graph: NavGraph, node: int) -> tuple[np.ndarray, np.ndarray, np.n
 
 def nearest_views(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
     """(n,) int64: the views whose centres are nearest in sqrt(dyaw^2 + dpitch^2) (docs/sources.md, S2)."""
-    d_yaw = wrap(yaw[:, None] - VIEW_YAWS)
-    d_pitch = pitch[:, None] - VIEW_PITCHES
+    d_yaw = wrap(yaw[:, None] - interface.VIEW_YAWS)
+    d_pitch = pitch[:, None] - interface.VIEW_PITCHES
     return np.argmin(np.round(d_yaw**2 + d_pitch**2, 9), axis=1)
 
 
@@ -98,33 +83,36 @@ def bearing_order(bearing: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     return np.lexsort((nodes, np.round(np.abs(bearing), 9)))
 
 
-def panoramic_reach(graph: NavGraph, pose: Pose) -> Reach:
+def panoramic_reach(graph: NavGraph, pose: interface.Pose) -> Reach:
     """Neighbours sorted by |bearing| from the agent's yaw (docs/sources.md, S2); the tilt does not matter."""
     nodes, yaw, pitch = directions(graph, pose.node)
     bearing = wrap(yaw - pose.yaw)
     order = bearing_order(bearing, nodes)
     view = nearest_views(yaw, pitch)[order]
     angles = (bearing[order].astype(np.float32), pitch[order].astype(np.float32))
-    candidates = Candidates(*angles, view, np.ones(len(nodes), dtype=bool))
-    poses = tuple(Pose(int(j), int(v) % TURNS, int(v) // TURNS - 1) for j, v in zip(nodes[order], view))
+    candidates = interface.Candidates(*angles, view, np.ones(len(nodes), dtype=bool))
+    poses = tuple(
+        interface.Pose(int(j), int(v) % interface.TURNS, int(v) // interface.TURNS - 1)
+        for j, v in zip(nodes[order], view)
+    )
     return candidates, poses
 
 
-def monocular_reach(graph: NavGraph, pose: Pose) -> Reach:
+def monocular_reach(graph: NavGraph, pose: interface.Pose) -> Reach:
     """The five moves of WORDS; 'forward' keeps the camera's angles."""
     ahead = node_ahead(graph, pose)
-    forward = pose if ahead is None else Pose(ahead, pose.turn, pose.tilt)
+    forward = pose if ahead is None else interface.Pose(ahead, pose.turn, pose.tilt)
     up, down = min(pose.tilt + 1, 1), max(pose.tilt - 1, -1)
     poses = (
         forward,
-        Pose(pose.node, (pose.turn + 1) % TURNS, pose.tilt),
-        Pose(pose.node, (pose.turn - 1) % TURNS, pose.tilt),
-        Pose(pose.node, pose.turn, up),
-        Pose(pose.node, pose.turn, down),
+        interface.Pose(pose.node, (pose.turn + 1) % interface.TURNS, pose.tilt),
+        interface.Pose(pose.node, (pose.turn - 1) % interface.TURNS, pose.tilt),
+        interface.Pose(pose.node, pose.turn, up),
+        interface.Pose(pose.node, pose.turn, down),
     )
-    candidates = Candidates(
-        np.array([0.0, STEP, -STEP, 0.0, 0.0], dtype=np.float32),
-        np.array([pose.pitch, pose.pitch, pose.pitch, up * STEP, down * STEP], dtype=np.float32),
+    candidates = interface.Candidates(
+        np.array([0.0, interface.STEP, -interface.STEP, 0.0, 0.0], dtype=np.float32),
+        np.array([pose.pitch, pose.pitch, pose.pitch, up * interface.STEP, down * interface.STEP], dtype=np.float32),
         np.array([p.view for p in poses]),
         np.array([ahead is not None, True, True, pose.tilt < 1, pose.tilt > -1]),
         WORDS,
@@ -132,7 +120,7 @@ def monocular_reach(graph: NavGraph, pose: Pose) -> Reach:
     return candidates, poses
 
 
-def node_ahead(graph: NavGraph, pose: Pose) -> int | None:
+def node_ahead(graph: NavGraph, pose: interface.Pose) -> int | None:
     """The neighbour nearest the middle of the view among those within FIELD sideways, if any."""
     nodes, yaw, pitch = directions(graph, pose.node)
     bearing = wrap(yaw - pose.yaw)
@@ -143,26 +131,29 @@ def node_ahead(graph: NavGraph, pose: Pose) -> int | None:
     return int(nodes[int(np.argmin(offset))])
 
 
-def door_actions(o: Observation) -> dict[str, Action]:
+def door_actions(o: interface.Observation) -> dict[str, interface.Action]:
     """Opening and closing what can be opened and closed now, by the names that language models use."""
-    return {**{f"open {k}": Open(k) for k in o.can_open}, **{f"close {k}": Close(k) for k in o.can_close}}
+    return {
+        **{f"open {k}": interface.Open(k) for k in o.can_open},
+        **{f"close {k}": interface.Close(k) for k in o.can_close},
+    }
 
 
-def doors_moved(step: Step, graph: NavGraph, closed: frozenset[str]) -> frozenset[str]:
+def doors_moved(step: interface.Step, graph: NavGraph, closed: frozenset[str]) -> frozenset[str]:
     """Doors that a step opened or closed; a move opens those that it goes through.
 
     Args:
       closed: the doors that were closed before.
     """
-    if not isinstance(step.action, Move | Open | Close):
+    if not isinstance(step.action, interface.Move | interface.Open | interface.Close):
         return frozenset()
     here, there = step.pose.node, step.candidate_nodes[step.action.candidate]
-    if isinstance(step.action, Close):
+    if isinstance(step.action, interface.Close):
         return frozenset(graph.doors.get((min(here, there), max(here, there)), ())) - closed
     return frozenset(graph.barred(here, there, closed))
 
 
-def doors_in(episode: Episode, graph: NavGraph) -> list[tuple[frozenset[str], frozenset[str]]]:
+def doors_in(episode: interface.Episode, graph: NavGraph) -> list[tuple[frozenset[str], frozenset[str]]]:
     """For each step of an episode: the doors that were closed before it, and those that it opened or closed."""
     closed, doors = graph.closed.union(episode.task.closed), []
     for step in episode.steps:

@@ -23,7 +23,7 @@ import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from embodied.agents.language_models.client import WithModel, client_of
 from embodied.agents.options import Encoded, Threaded
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from embodied.datasets.store import Dataset, SplitData
     from embodied.envs.base import HelpEnv
     from embodied.evaluation.tables import Row
-    from embodied.interface import Agent, Assistant, Episode, Place, SeenPlace
+    from embodied.interface import Agent, Assistant, Episode, SeenPlace
     from embodied.kinds.task_kind import TaskKind
 
 LLM, TEMPLATE = "llm", "template"
@@ -295,7 +295,7 @@ def play_split(evaluation: Evaluation, split: SplitData) -> None:
     from embodied.agents.language_models.agent import followed_replies
     from embodied.evaluation.evaluate import evaluate
 
-    args, worlds = evaluation.args, seen_places(split.worlds) if evaluation.looks else None
+    args, worlds = evaluation.args, cast("Mapping[str, SeenPlace]", split.worlds) if evaluation.looks else None
 
     def kept(name: str, episodes: Sequence[Episode]) -> None:
         evaluation.keep(split.name, name, episodes)
@@ -396,17 +396,13 @@ def agent_of(evaluation: Evaluation, name: str, split: SplitData, worlds: Mappin
 
     prompt, sees = agent_prompt(evaluation.args.prompts), evaluation.args.sees
     if sees == "names":
-        builder = PromptBuilder(oracle_names(seen_places(split.worlds)), prompt=prompt)
+        builder = PromptBuilder(oracle_names(cast("Mapping[str, SeenPlace]", split.worlds)), prompt=prompt)
     elif sees == "nothing":
         builder = PromptBuilder(prompt=prompt)
     else:
         drawn = {n: w for n, w in split.worlds.items() if isinstance(w, World)}
         builder = PromptBuilder(None, PanoramaStore(drawn), sees, prompt)
     return LanguageModelAgent(evaluation.client(), builder)
-
-
-def seen_places(worlds: Mapping[str, Place]) -> Mapping[str, SeenPlace]:
-    return worlds  # type: ignore[return-value]  # all that are opened here can be seen
 
 
 # Results -----------------------------------------------------------------------------------------

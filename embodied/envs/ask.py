@@ -5,25 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from embodied import interface
 from embodied.action_spaces import Moves
 from embodied.assistants.ask import in_view
 from embodied.assistants.descriptions import Describer, features_in_words, side
 from embodied.envs.base import HelpEnv
 from embodied.geometry import wrap
-from embodied.interface import (
-    Action,
-    Ask,
-    Assistant,
-    Description,
-    Detection,
-    Extras,
-    FindDescribed,
-    Intention,
-    Move,
-    Place,
-    Reply,
-    Stop,
-)
 from embodied.seeds import stream
 
 FITS, OTHER, DENIED = 0.75, 0.35, 0.1
@@ -48,7 +35,7 @@ class Prices:
         if not all(0 <= getattr(self, f) < float("inf") for f in self.__dataclass_fields__):
             raise ValueError(f"prices should be numbers from 0 on, got {self}")
 
-    def of(self, question: Intention) -> float:
+    def of(self, question: interface.Intention) -> float:
         return float(getattr(self, question.value))
 
 
@@ -63,14 +50,14 @@ class AskSettings:
 
 
 @dataclass(frozen=True)
-class AskExtras(Extras):
+class AskExtras(interface.Extras):
     """Observation of the agent besides what all kinds see."""
 
-    state_description: Description
+    state_description: interface.Description
     """The room and what is near."""
-    detections: tuple[Detection, ...]
+    detections: tuple[interface.Detection, ...]
     """The best first."""
-    advised: Move | Stop | None
+    advised: interface.Move | interface.Stop | None
     """The next action of the route that was told; None where none is being followed."""
 
     def lines(self, turn: int) -> tuple[str, ...]:
@@ -78,7 +65,7 @@ class AskExtras(Extras):
         for d in self.detections:
             parts.append(f"perhaps it: {side(d.bearing)}, {d.distance:.1f} m, score {d.score:.2f}")
         if self.advised is not None:
-            advice = "stop here" if isinstance(self.advised, Stop) else f"go {self.advised.candidate}"
+            advice = "stop here" if isinstance(self.advised, interface.Stop) else f"go {self.advised.candidate}"
             parts.append(f"the route that you were told says: {advice}")
         return tuple(parts)
 
@@ -97,8 +84,8 @@ class AskEnv(HelpEnv):
 
     def __init__(
         self,
-        worlds: Mapping[str, Place],
-        assistant: Assistant,
+        worlds: Mapping[str, interface.Place],
+        assistant: interface.Assistant,
         moves: Moves | None = None,
         rules: AskSettings = AskSettings(),
         describer: Describer | None = None,
@@ -111,7 +98,7 @@ class AskEnv(HelpEnv):
         return {"price": sum(s.cost for s in self._steps)}
 
     def _begin(self) -> None:
-        if not isinstance(self.task.goal, FindDescribed):
+        if not isinstance(self.task.goal, interface.FindDescribed):
             raise TypeError(f"{self.task.id!r} is of kind {self.task.kind!r}, here 'ask' is played")
         self._goal = self.task.goal
         self._fitting: tuple[str, ...] = self._goal.fitting
@@ -121,7 +108,7 @@ class AskEnv(HelpEnv):
         self._arrives = False
         """It leads to a goal node, not only towards one."""
 
-    def _replied(self, reply: Reply) -> None:
+    def _replied(self, reply: interface.Reply) -> None:
         self._fitting = tuple(p for p in self._fitting if p not in reply.ruled_out)
         self._denied |= set(reply.ruled_out)
         if reply.subtask is not None:
@@ -137,8 +124,8 @@ class AskEnv(HelpEnv):
         if self.pose.node not in self._way or (len(self._way) == 1 and not self._arrives):
             self._way = ()
 
-    def _cost(self, action: Action) -> float:
-        return self.rules.prices.of(action.intention) if isinstance(action, Ask) else 0.0
+    def _cost(self, action: interface.Action) -> float:
+        return self.rules.prices.of(action.intention) if isinstance(action, interface.Ask) else 0.0
 
     def _truth(self) -> AskTruth:
         return AskTruth(self._fitting)
@@ -147,12 +134,16 @@ class AskEnv(HelpEnv):
         here = self._describer.dense(self.world, self.pose.node)
         return AskExtras(here, self._detections(), self._advised())
 
-    def _advised(self) -> Move | Stop | None:
+    def _advised(self) -> interface.Move | interface.Stop | None:
         if not self.rules.grounded or not self._way:
             return None
-        return Stop() if len(self._way) == 1 else Move(self.situation.candidate_nodes.index(self._way[1]))
+        return (
+            interface.Stop()
+            if len(self._way) == 1
+            else interface.Move(self.situation.candidate_nodes.index(self._way[1]))
+        )
 
-    def _detections(self) -> tuple[Detection, ...]:
+    def _detections(self) -> tuple[interface.Detection, ...]:
         known = self._fitting if self.rules.grounded else self._goal.fitting
         denied = self._denied if self.rules.grounded else ()
         detections = []
@@ -160,5 +151,7 @@ class AskEnv(HelpEnv):
             rng = stream(0, "detector", self.task.world, name, self.pose.node)
             mean = DENIED if name in denied else FITS if name in known else OTHER
             score = min(max(mean + SCORE_NOISE * float(rng.standard_normal()), 0.0), 1.0)
-            detections.append(Detection(float(wrap(yaw - self.pose.yaw)), round(distance, 2), round(score, 2)))
+            detections.append(
+                interface.Detection(float(wrap(yaw - self.pose.yaw)), round(distance, 2), round(score, 2))
+            )
         return tuple(sorted(detections, key=lambda d: (-d.score, d.distance)))

@@ -24,26 +24,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from embodied import interface
 from embodied.action_spaces import PanoramicMoves
 from embodied.envs.base import HelpEnv
-from embodied.interface import (
-    Agent,
-    Assistant,
-    Episode,
-    Intention,
-    Language,
-    Observation,
-    Place,
-    Route,
-    SeenPlace,
-    Task,
-)
 from embodied.kinds.plugins import announce_kind, record_named, shipped_kinds
 from embodied.kinds.splits import Splits, SplitSizes, seen_and_unseen
 from embodied.navigation.graph import NavGraph
 from embodied.policies.baselines import Forward10, RandomWalk, Shortest
 
-Measure = Callable[[Episode, NavGraph], float]
+Measure = Callable[[interface.Episode, NavGraph], float]
 """A number of one finished episode, given the graph of its house."""
 SIXTEENTHS = {"main": range(14), "val": range(14, 15), "test": range(15, 16)}
 """Positions of a house's pool of tasks, modulo 16, that belong to each part: seen splits hold out tasks."""
@@ -60,21 +49,21 @@ UNBOUNDED = 1e6
 class TaskInputs:
     """Inputs of the tasks of one house."""
 
-    world: Place
-    routes: Sequence[Route]
+    world: interface.Place
+    routes: Sequence[interface.Route]
     """Worded routes through the house; empty where the kind asks for none."""
     seed: int
-    language: Language
+    language: interface.Language
     rooms: bool = True
     """False: requests name no room, where the kind can do without."""
 
 
 Parts = Sequence[tuple[str, int]]
 """Parts of a house's pool, with the number of tasks wanted of each."""
-PartTasks = dict[str, list[Task]]
+PartTasks = dict[str, list[interface.Task]]
 
 
-def parts_of_pool(size: int, task: Callable[[int], Task], parts: Parts) -> PartTasks:
+def parts_of_pool(size: int, task: Callable[[int], interface.Task], parts: Parts) -> PartTasks:
     """The first tasks of each part of a pool: of every sixteen, fourteen are to train, one to validate, one to test.
 
     Args:
@@ -89,9 +78,9 @@ def parts_of_pool(size: int, task: Callable[[int], Task], parts: Parts) -> PartT
 class TimeLimits:
     """Time limits that are learned from the training tasks of a data set and hold in its other splits."""
 
-    learn: Callable[[Sequence[Task], Callable[[str], Place]], Any]
+    learn: Callable[[Sequence[interface.Task], Callable[[str], interface.Place]], Any]
     """(training tasks, house of a name) -> what `apply` needs."""
-    apply: Callable[[Task, Place, Any], Task]
+    apply: Callable[[interface.Task, interface.Place, Any], interface.Task]
 
 
 # Play -------------------------------------------------------------------------------------------
@@ -101,19 +90,19 @@ class TimeLimits:
 class EnvInputs:
     """Inputs that all environments of one maker share."""
 
-    worlds: Mapping[str, Place]
+    worlds: Mapping[str, interface.Place]
     """By House.name."""
-    routes: Callable[[str], Sequence[Route]] = lambda world: ()
+    routes: Callable[[str], Sequence[interface.Route]] = lambda world: ()
     """Worded routes of a house, for the assistants who know them."""
     wording: str = "test"
     """The split of the routes that is spoken."""
-    language: Language | None = None
+    language: interface.Language | None = None
     """Voice of an assistant; plain words where not given."""
-    training: Callable[[], Iterable[Place]] | None = None
+    training: Callable[[], Iterable[interface.Place]] | None = None
     """Houses to learn from, where an assistant counts what is common; `worlds` where not given."""
     rules: Any = None
     """Rules of play, of the type of TaskKind.rules; those where not given."""
-    assistant: Assistant | None = None
+    assistant: interface.Assistant | None = None
     """Who answers, instead of the kind's own assistant."""
 
 
@@ -143,7 +132,7 @@ class ExtraArrays:
 
     specs: Callable[[int, Any], Mapping[str, ArraySpec]]
     """(number of candidates, rules of play) -> array by name."""
-    encode: Callable[[Observation, Mapping[str, ArraySpec]], Mapping[str, Any]]
+    encode: Callable[[interface.Observation, Mapping[str, ArraySpec]], Mapping[str, Any]]
     """(observation, specs) -> the values, of the shapes of the specs."""
 
 
@@ -177,12 +166,12 @@ class StoryStyle:
 
 # The record -------------------------------------------------------------------------------------
 
-PLAIN_AGENTS: Mapping[str, Callable[[], Agent]] = {
+PLAIN_AGENTS: Mapping[str, Callable[[], interface.Agent]] = {
     "random walk": RandomWalk,
     "forward 10": Forward10,
     "shortest": Shortest,
 }
-INTENTIONS = (Intention.HELP, Intention.CUR, Intention.GOAL, Intention.SUB)
+INTENTIONS = (interface.Intention.HELP, interface.Intention.CUR, interface.Intention.GOAL, interface.Intention.SUB)
 """Questions of a kind that does not say otherwise."""
 
 
@@ -202,14 +191,14 @@ class TaskKind:
     """A maker of environments: the rule of play with its assistant. Use the method `environments`."""
     rules: Any = None
     """The usual rules of play: a frozen record or a word; None where there is nothing to choose."""
-    fitted: Callable[[Task, Place, Any], Task] | None = None
+    fitted: Callable[[interface.Task, interface.Place, Any], interface.Task] | None = None
     """(task, house, rules) -> the task with as much time as the rules need."""
     help: Literal["none", "words", "descriptions"] = "none"
     """How its assistant helps: in words, which a person can say instead, by descriptions, or not at all."""
 
-    baselines: Mapping[str, Callable[[], Agent]] = field(default_factory=lambda: PLAIN_AGENTS)
+    baselines: Mapping[str, Callable[[], interface.Agent]] = field(default_factory=lambda: PLAIN_AGENTS)
     """Agents that do not learn."""
-    looking: Mapping[str, Callable[[Mapping[str, SeenPlace]], Agent]] = field(default_factory=dict)
+    looking: Mapping[str, Callable[[Mapping[str, interface.SeenPlace]], interface.Agent]] = field(default_factory=dict)
     """More of them, which look around: made for worlds with sightings, not only houses and graphs."""
     expert: str = "shortest"
     """The baseline that shows how a task is done; it asks where help can be had."""
@@ -227,7 +216,7 @@ class TaskKind:
     test_splits: tuple[str, ...] = ("test_unseen",)
     """Splits to evaluate in unless somebody says otherwise."""
 
-    intentions: tuple[Intention, ...] = INTENTIONS
+    intentions: tuple[interface.Intention, ...] = INTENTIONS
     """Questions that may be asked, in the order of the actions' numbers."""
     extras: ExtraArrays | None = None
     """Of a kind whose environments fill in Observation.extras."""
@@ -280,7 +269,9 @@ class TaskKind:
             raise ValueError(f"rules of {self.name!r} should be of the kind of {self.rules!r}, got {rules!r}")
         return rules
 
-    def tasks_under(self, tasks: Iterable[Task], worlds: Mapping[str, Place], rules: Any) -> tuple[Task, ...]:
+    def tasks_under(
+        self, tasks: Iterable[interface.Task], worlds: Mapping[str, interface.Place], rules: Any
+    ) -> tuple[interface.Task, ...]:
         """The tasks with as much time as rules of play need.
 
         Raises:
@@ -289,7 +280,7 @@ class TaskKind:
         rules = self.checked_rules(rules)
         return tuple(tasks if self.fitted is None else (self.fitted(t, worlds[t.world], rules) for t in tasks))
 
-    def agent(self, name: str, worlds: Mapping[str, SeenPlace] | None = None) -> Agent:
+    def agent(self, name: str, worlds: Mapping[str, interface.SeenPlace] | None = None) -> interface.Agent:
         """A fresh agent that does not learn, by name.
 
         Args:

@@ -96,16 +96,6 @@ def normal(heading: float) -> float:
     return heading if heading < 2 * math.pi else 0.0
 
 
-def sign_steps(change: float) -> int:
-    """Upstream: only the sign counts."""
-    return int(change > 0) - int(change < 0)
-
-
-def counted_steps(change: float) -> float:
-    """HANNA's fork: the change is a number of steps."""
-    return change
-
-
 class DiscreteViews:
     """A batch of poses, each row * 36 + viewIndex.
 
@@ -115,7 +105,7 @@ class DiscreteViews:
 
     def __init__(self, lookout: NavigableLocations, steps: Callable[[float], float]) -> None:
         """Args:
-        steps: turns a requested change into steps of 30 degrees, `sign_steps` or `counted_steps`.
+        steps: turns a requested change into steps of 30 degrees.
         """
         self.lookout, self._steps = lookout, steps
         self._codes: list[int] = []

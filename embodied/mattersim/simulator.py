@@ -16,7 +16,7 @@ import numpy as np
 
 from embodied.mattersim.graphs import Graphs, listed_scans, load_graphs
 from embodied.mattersim.pictures import Skyboxes
-from embodied.mattersim.sight import DiscreteViews, NavigableLocations, ViewPoint, counted_steps, lookout, sign_steps
+from embodied.mattersim.sight import DiscreteViews, NavigableLocations, ViewPoint, lookout
 from embodied.seeds import stream
 
 Draw = Callable[[str, str, float, float, float, tuple[int, int]], np.ndarray]
@@ -78,7 +78,7 @@ class SimState:
 class Simulator:
     """Upstream: with discretized angles the sign of a change turns or tilts by 30 degrees."""
 
-    _steps: Callable[[float], float] = staticmethod(sign_steps)
+    _steps: Callable[[float], float] = staticmethod(lambda change: int(change > 0) - int(change < 0))
 
     def __init__(self) -> None:
         self._graph_path, self._dataset_path = "./connectivity", "./data/v1/scans/"
@@ -285,7 +285,7 @@ class Simulator:
 class ForkSimulator(Simulator):
     """HANNA and ILIAD: with discretized angles a change counts steps of 30 degrees; navigation is always restricted."""
 
-    _steps = staticmethod(counted_steps)
+    _steps = staticmethod(lambda change: change)
     setRestrictedNavigation = property()  # the fork has no such method
 
 

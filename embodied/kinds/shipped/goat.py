@@ -13,20 +13,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from embodied import interface
 from embodied.envs.base import HelpEnv
-from embodied.interface import (
-    TURNS,
-    Episode,
-    FindInTurn,
-    NextGoal,
-    Pose,
-    Stop,
-    Subtask,
-    SuccessRule,
-    Task,
-    Trajectory,
-    Viewpoint,
-)
 from embodied.kinds.splits import SplitPlan, Splits, SplitSizes
 from embodied.kinds.task_kind import Metric, Parts, PartTasks, StoryStyle, TaskInputs, TaskKind, register_kind
 from embodied.language.plain_language import with_article
@@ -46,14 +34,16 @@ SYNONYMS, UNSEEN_CLASSES = "synonyms", "unseen_classes"
 
 def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
     """As many of a part as are wanted; none in a house with fewer than two of its classes."""
-    things: dict[str, list[NextGoal]] = {}
+    things: dict[str, list[interface.NextGoal]] = {}
     for x in find_instances(inputs.world, GOAT_REACH):
-        one = NextGoal("image", x.object_class, (x.placement,), x.nodes, "find the place of the picture", x.nodes[0])
+        one = interface.NextGoal(
+            "image", x.object_class, (x.placement,), x.nodes, "find the place of the picture", x.nodes[0]
+        )
         things.setdefault(x.object_class, []).append(one)
-    described: dict[str, list[NextGoal]] = {}
+    described: dict[str, list[interface.NextGoal]] = {}
     for goal, nodes in ask_pool(inputs.world, look_of(getattr(inputs.world, "catalogue", None)), seed=0).goals:
         if len(goal.fitting) == 1:
-            one = NextGoal("description", goal.object_class, goal.fitting, nodes, request(goal))
+            one = interface.NextGoal("description", goal.object_class, goal.fitting, nodes, request(goal))
             described.setdefault(goal.object_class, []).append(one)
     made: PartTasks = {}
     for part, count in parts:
@@ -67,17 +57,17 @@ def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
     return made
 
 
-def _any_of(name: str, some: Sequence[NextGoal]) -> tuple[NextGoal, ...]:
+def _any_of(name: str, some: Sequence[interface.NextGoal]) -> tuple[interface.NextGoal, ...]:
     """The goal of finding any thing of a class."""
     nodes, placements = tuple(sorted({v for g in some for v in g.nodes})), tuple(p for g in some for p in g.placements)
-    return (NextGoal("object", name, placements, nodes, f"find {with_article(name)}"),)
+    return (interface.NextGoal("object", name, placements, nodes, f"find {with_article(name)}"),)
 
 
 def _task(
-    inputs: TaskInputs, goals: Mapping[str, Sequence[Sequence[NextGoal]]], nouns: Mapping[str, str], name: str
-) -> Task:
+    inputs: TaskInputs, goals: Mapping[str, Sequence[Sequence[interface.NextGoal]]], nouns: Mapping[str, str], name: str
+) -> interface.Task:
     """Goals of the classes of `nouns`, which say them; never the same class twice in a row, each form as likely."""
-    rng, chosen = stream(inputs.seed, "task", name), list[NextGoal]()
+    rng, chosen = stream(inputs.seed, "task", name), list[interface.NextGoal]()
     for _ in range(int(rng.integers(FEWEST_IN_TURN, MOST_IN_TURN + 1))):
         other = [n for n in nouns if not chosen or nouns[n] != chosen[-1].category]
         of_class = other[int(rng.integers(len(other)))]
@@ -87,9 +77,11 @@ def _task(
             words = goal.words.replace(with_article(of_class), with_article(noun)).replace(of_class, noun)
             goal = dataclasses.replace(goal, words=words)
         chosen.append(dataclasses.replace(goal, category=noun))
-    start = Pose(int(rng.integers(len(inputs.world.graph.positions))), int(rng.integers(TURNS)))
+    start = interface.Pose(int(rng.integers(len(inputs.world.graph.positions))), int(rng.integers(interface.TURNS)))
     house, horizon, last = inputs.world.house.name, GOAL_STEPS * len(chosen), chosen[-1].nodes
-    return Task(name, "goat", house, start, FindInTurn(tuple(chosen)), last, chosen[0].words, 0.0, horizon)
+    return interface.Task(
+        name, "goat", house, start, interface.FindInTurn(tuple(chosen)), last, chosen[0].words, 0.0, horizon
+    )
 
 
 def splits(sizes: SplitSizes) -> Splits:
@@ -104,7 +96,7 @@ class GoatEnv(HelpEnv):
     """Stopping, or GOAL_STEPS steps, end a goal; then the next one is told. A step's `subtask` is the goal's number."""
 
     def _begin(self) -> None:
-        assert isinstance(self.task.goal, FindInTurn), "tasks of this kind"
+        assert isinstance(self.task.goal, interface.FindInTurn), "tasks of this kind"
         self._left = list(self.task.goal.goals)
         self._turn_to_next("limit")
         self.instruction = self.task.request
@@ -122,22 +114,22 @@ class GoatEnv(HelpEnv):
             return
         number, goal = -len(self._left), self._left.pop(0)
         self.instruction, self.targets, self.time_on_task = goal.words, goal.nodes, 0
-        self.subtask = Subtask(f"goal {number}", goal.nodes[0])
-        self.target = None if goal.picture is None else Viewpoint(self.task.world, goal.picture)
+        self.subtask = interface.Subtask(f"goal {number}", goal.nodes[0])
+        self.target = None if goal.picture is None else interface.Viewpoint(self.task.world, goal.picture)
 
 
-def outcomes(episode: Episode, graph: NavGraph) -> list[tuple[NextGoal, Trajectory]]:
+def outcomes(episode: interface.Episode, graph: NavGraph) -> list[tuple[interface.NextGoal, interface.Trajectory]]:
     """Each goal and the walk to it, judged from where it was told, as GOAT-Bench's evaluator does: found means stopped
     at a place of the goal. One that never came was not found."""
     metres, judged = np.asarray(graph.distance), []
-    goals = episode.task.goal.goals if isinstance(episode.task.goal, FindInTurn) else ()
+    goals = episode.task.goal.goals if isinstance(episode.task.goal, interface.FindInTurn) else ()
     for k, goal in enumerate(goals):
         steps = [s for s in episode.steps if s.subtask == f"goal {k - len(goals)}"]
         way = [*(s.pose.node for s in steps), *(s.next_pose.node for s in steps[-1:])] or [episode.nodes[-1]]
         near, lengths = metres[np.ix_(way, goal.nodes)].min(axis=1), metres[way[:-1], way[1:]].cumsum()
-        stopped = bool(steps) and isinstance(steps[-1].action, Stop)
+        stopped = bool(steps) and isinstance(steps[-1].action, interface.Stop)
         walk = {"distances": near, "lengths": np.array([0.0, *lengths]), "shortest": float(near[0])}
-        judged.append((goal, Trajectory(rule=SuccessRule(0.0), stopped=stopped, **walk)))
+        judged.append((goal, interface.Trajectory(rule=interface.SuccessRule(0.0), stopped=stopped, **walk)))
     return judged
 
 
