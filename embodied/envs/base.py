@@ -12,31 +12,8 @@ import enum
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
+from embodied import interface
 from embodied.action_spaces import Moves, PanoramicMoves, doors_moved
-from embodied.interface import (
-    Action,
-    Ask,
-    Assistant,
-    Close,
-    Episode,
-    Extras,
-    FindDescribed,
-    GoTo,
-    Intention,
-    Mode,
-    Move,
-    Observation,
-    Open,
-    Place,
-    Reply,
-    Sight,
-    Situation,
-    Step,
-    Stop,
-    Subtask,
-    Task,
-    Viewpoint,
-)
 from embodied.navigation.doors import seen_name
 from embodied.navigation.graph import behind_doors
 from embodied.seeds import checked_seed, stream
@@ -77,7 +54,10 @@ class HelpEnv:
     doors: DoorRule = DoorRule.OPEN
 
     def __init__(
-        self, worlds: Mapping[str, Place], assistant: Assistant | None = None, moves: Moves | None = None
+        self,
+        worlds: Mapping[str, interface.Place],
+        assistant: interface.Assistant | None = None,
+        moves: Moves | None = None,
     ) -> None:
         """
         Args:
@@ -89,11 +69,11 @@ class HelpEnv:
         self.assistant = assistant
         self.moves = moves or PanoramicMoves()
         self.ended: str | None = "limit"
-        self._steps: list[Step] = []
+        self._steps: list[interface.Step] = []
 
     # Playing -------------------------------------------------------------------------------------
 
-    def reset(self, task: Task, *, seed: int = 0) -> Observation:
+    def reset(self, task: interface.Task, *, seed: int = 0) -> interface.Observation:
         """Begin `task`; equal (task, seed) and equal actions give equal episodes.
 
         Raises:
@@ -102,10 +82,10 @@ class HelpEnv:
         check_task(task, self.worlds)
         self.task, self.seed, self.world = task, checked_seed(seed), self.worlds[task.world]
         self.pose = task.start
-        self.mode, self.instruction = Mode.MAIN, task.request
-        self.target: Viewpoint | None = None
+        self.mode, self.instruction = interface.Mode.MAIN, task.request
+        self.target: interface.Viewpoint | None = None
         self.targets = task.goal_nodes
-        self.subtask: Subtask | None = None
+        self.subtask: interface.Subtask | None = None
         self.time = self.time_on_task = self.requests = 0
         self.budget = self._budget()
         self.ended = None
@@ -115,7 +95,7 @@ class HelpEnv:
         self._begin()
         return self._look()
 
-    def step(self, action: Action) -> Observation | None:
+    def step(self, action: interface.Action) -> interface.Observation | None:
         """Take one action; the next observation, or None when the episode has ended.
 
         Raises:
@@ -123,28 +103,28 @@ class HelpEnv:
             can be asked that here. Nothing has changed then.
         """
         self._check(action)
-        if isinstance(action, Move) and self.doors is DoorRule.PUSH and self._barred(action.candidate):
-            action = Open(action.candidate, action.thought)
+        if isinstance(action, interface.Move) and self.doors is DoorRule.PUSH and self._barred(action.candidate):
+            action = interface.Open(action.candidate, action.thought)
         before, situation = self.observation, self.situation
         mode, instruction, targets, subtask = self.mode, self.instruction, self.targets, self.subtask
         reply, cost = None, self._cost(action)
         self.time_on_task += 1
-        if isinstance(action, Move):
+        if isinstance(action, interface.Move):
             self.pose = self._reach[1][action.candidate]
             self._moved()
-        elif isinstance(action, Ask):
+        elif isinstance(action, interface.Ask):
             rng = stream(self.seed, "assistant", self.task.id, self.time)
             asked = dataclasses.replace(situation, question=action.question or "")
             reply = required(self.assistant, "assistant").answer(asked, action.intention, rng=rng)
             self.requests += 1
             self._replied(reply)
-        elif isinstance(action, Stop):
+        elif isinstance(action, interface.Stop):
             self._stopped()
-        if self.asking_takes_time or not isinstance(action, Ask):
+        if self.asking_takes_time or not isinstance(action, interface.Ask):
             self.time += 1
         if self.ended is None and self.time >= self.task.horizon:
             self.ended = "limit"
-        step = Step(
+        step = interface.Step(
             pose=situation.pose,
             mode=mode,
             instruction=instruction,
@@ -179,11 +159,11 @@ class HelpEnv:
         return min(float(distance[self.pose.node, g]) for g in self.task.goal_nodes) / 10.0
 
     @property
-    def last_step(self) -> Step:
+    def last_step(self) -> interface.Step:
         """The step that was just written down."""
         return self._steps[-1]
 
-    def episode(self, agent: str = "") -> Episode:
+    def episode(self, agent: str = "") -> interface.Episode:
         """The finished episode.
 
         Raises:
@@ -193,9 +173,9 @@ class HelpEnv:
             raise RuntimeError(f"episode of task {self.task.id!r} has not ended; step until it returns None")
         return self.so_far(agent)
 
-    def so_far(self, agent: str = "") -> Episode:
+    def so_far(self, agent: str = "") -> interface.Episode:
         """The episode as if its time were up now, unless it has ended."""
-        return Episode(
+        return interface.Episode(
             task=self.task,
             steps=tuple(self._steps),
             ended=self.ended or "limit",
@@ -210,7 +190,7 @@ class HelpEnv:
     def _begin(self) -> None:
         """Set up what the rule needs beyond the common state."""
 
-    def _replied(self, reply: Reply) -> None:
+    def _replied(self, reply: interface.Reply) -> None:
         """Take in what the assistant said; set time_on_task to 0 when it changes the instruction."""
         raise TypeError(
             f"{type(self).__name__} does not say what a reply does; override _replied, or play by a rule with help"
@@ -223,15 +203,15 @@ class HelpEnv:
     def _moved(self) -> None:
         """The agent has just moved."""
 
-    def _askable(self, situation: Situation) -> tuple[Intention, ...]:
+    def _askable(self, situation: interface.Situation) -> tuple[interface.Intention, ...]:
         if self.assistant is None or (self.budget is not None and self.requests >= self.budget):
             return ()
         return self.assistant.intentions(situation)
 
-    def _cost(self, action: Action) -> float:
+    def _cost(self, action: interface.Action) -> float:
         return 0.0
 
-    def _extras(self) -> Extras | None:
+    def _extras(self) -> interface.Extras | None:
         """Observation.extras: what the agent is told besides."""
         return None
 
@@ -251,7 +231,7 @@ class HelpEnv:
             whole += 1
         return whole
 
-    def _look(self) -> Observation:
+    def _look(self) -> interface.Observation:
         self._reach = self.moves.at(self.world, self.pose)
         candidates, poses = self._reach
         barred = [k for k in range(len(poses)) if self.closed and self._barred(k)]
@@ -262,7 +242,7 @@ class HelpEnv:
         if len(self._trail) <= self.time:
             self._trail.append(self.pose.node)
         left = None if self.budget is None else max(self.budget - self.requests, 0)
-        self.situation = Situation(
+        self.situation = interface.Situation(
             world=self.world,
             task=self.task,
             pose=self.pose,
@@ -278,13 +258,13 @@ class HelpEnv:
             extras=self._truth(),
             closed=self.closed,
         )
-        self.observation = Observation(
-            sight=Sight(self._seen(), self.pose.node),
+        self.observation = interface.Observation(
+            sight=interface.Sight(self._seen(), self.pose.node),
             turn=self.pose.turn,
             tilt=self.pose.tilt,
             candidates=candidates,
             instruction=self.instruction,
-            target=None if self.target is None else Sight(self.target.world, self.target.node, picture=True),
+            target=None if self.target is None else interface.Sight(self.target.world, self.target.node, picture=True),
             mode=self.mode,
             can_ask=self._askable(self.situation),
             requests_left=left,
@@ -315,26 +295,26 @@ class HelpEnv:
             return self.task.world
         return seen_name(house, graph, self.pose.node, self.closed)
 
-    def _check(self, action: Action) -> None:
+    def _check(self, action: interface.Action) -> None:
         if self.ended is not None:
             raise ActionError(f"the episode is over ({self.ended}); reset before taking {action}")
-        if isinstance(action, Move):
+        if isinstance(action, interface.Move):
             allowed = self.observation.candidates.allowed
             if not 0 <= action.candidate < len(allowed):
                 raise ActionError(f"candidate {action.candidate} does not exist, there are {len(allowed)} here")
             if not allowed[action.candidate]:
                 raise ActionError(f"candidate {action.candidate} is masked here; choose one with allowed = True")
-        elif isinstance(action, Ask):
+        elif isinstance(action, interface.Ask):
             if action.intention not in self.observation.can_ask:
                 can = [i.value for i in self.observation.can_ask] or "nothing"
                 raise ActionError(
                     f"cannot ask {action.intention.value!r} here, only {can}; look at Observation.can_ask"
                 )
-        elif isinstance(action, Open | Close):
-            can_move = self.observation.can_open if isinstance(action, Open) else self.observation.can_close
+        elif isinstance(action, interface.Open | interface.Close):
+            can_move = self.observation.can_open if isinstance(action, interface.Open) else self.observation.can_close
             if action.candidate not in can_move:
                 raise ActionError(f"{action} is not possible here, only of the candidates {list(can_move)}")
-        elif not isinstance(action, Stop):
+        elif not isinstance(action, interface.Stop):
             raise ActionError(f"expected Move, Ask, Open, Close or Stop, got {action!r}")
 
 
@@ -349,7 +329,7 @@ def required(value: T | None, what: str) -> T:
     return value
 
 
-def check_task(task: Task, worlds: Mapping[str, Place]) -> None:
+def check_task(task: interface.Task, worlds: Mapping[str, interface.Place]) -> None:
     """Refuse a task that cannot be played.
 
     Raises:
@@ -365,9 +345,9 @@ def check_task(task: Task, worlds: Mapping[str, Place]) -> None:
             f"task {task.id!r} names the nodes {nodes}, world {task.world!r} has 0..{n - 1}; sample it again"
         )
     house, goal = world.house, task.goal
-    rooms = goal.rooms if isinstance(goal, GoTo) else ()
+    rooms = goal.rooms if isinstance(goal, interface.GoTo) else ()
     things: tuple[str, ...] = getattr(goal, "placements", ())
-    if isinstance(goal, FindDescribed):
+    if isinstance(goal, interface.FindDescribed):
         things = (goal.placement, *goal.fitting, *goal.similar)
     doors = {d for passed in world.graph.doors.values() for d in passed}
     if unknown := sorted(set(task.closed) - doors):

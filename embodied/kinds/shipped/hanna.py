@@ -13,14 +13,7 @@ from embodied.interface import Ask, Episode, Mode, Move, Place, Reply, Stop, Vie
 from embodied.kinds import task_kind
 from embodied.kinds.splits import five_splits
 from embodied.navigation.graph import NavGraph
-from embodied.policies.baselines import (
-    PerfectInterpreter,
-    PrivilegedAsking,
-    Shortest,
-    ask_at_random,
-    ask_every_5,
-    never_ask,
-)
+from embodied.policies import baselines
 from embodied.policies.listeners import ListeningInterpreter
 from embodied.tasks.goals import FindConfig, Pool, build_pool, find_instances, find_task, goal_classes
 
@@ -108,10 +101,10 @@ HANNA = task_kind.register_kind(
         help="words",
         baselines={
             **task_kind.PLAIN_AGENTS,  # in the next three the teacher navigates: they show what asking so costs
-            "no ask": lambda: PrivilegedAsking(Shortest(), never_ask),
-            "random ask": lambda: PrivilegedAsking(Shortest(), ask_at_random),
-            "ask every 5": lambda: PrivilegedAsking(Shortest(), ask_every_5),
-            "perfect interpretation": PerfectInterpreter,
+            "no ask": lambda: baselines.PrivilegedAsking(baselines.Shortest(), baselines.never_ask),
+            "random ask": lambda: baselines.PrivilegedAsking(baselines.Shortest(), baselines.ask_at_random),
+            "ask every 5": lambda: baselines.PrivilegedAsking(baselines.Shortest(), baselines.ask_every_5),
+            "perfect interpretation": baselines.PerfectInterpreter,
         },
         looking={"scripted listener": ListeningInterpreter},
         expert="perfect interpretation",
