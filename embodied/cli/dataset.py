@@ -49,6 +49,8 @@ class DatasetOptions(Furnished, Printed):
     """Random seed; the same seed gives the same data set."""
     area: Annotated[tuple[float, float], Option(metavar=("LOW", "HIGH"))] = (150.0, 420.0)
     """Size of the houses in square metres."""
+    storeys: Annotated[int, Option(whole(1, 3), "N")] = 1
+    """Storeys of every house (all kinds but vqa)."""
     language: Annotated[str, Option(words=("people", "plain"))] = "people"
     """Wording of the routes: varied, with habits and landmarks (people), or plain turns and rooms (plain)."""
     no_rooms: bool = False
@@ -111,8 +113,8 @@ def run(args: DatasetOptions) -> None:
     from embodied.datasets.store import Dataset
     from embodied.generate import HouseConfig
 
-    HouseConfig(area=args.area)  # refuses what no house can have, before a folder is made
-    words: dict[str, Any] = {"language": args.language, "rooms": not args.no_rooms}
+    HouseConfig(area=args.area, storeys=args.storeys)  # refuses what no house can have, before a folder is made
+    words: dict[str, Any] = {"language": args.language, "rooms": not args.no_rooms, "storeys": args.storeys}
     people = not args.no_people
     config = DatasetConfig(args.kind, chosen_scale(args), args.seed, args.area, people=people, ood=args.ood, **words)
     watch = lambda jobs, total: tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())

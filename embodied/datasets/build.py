@@ -46,7 +46,7 @@ VOICES: Mapping[str, Callable[[str | None], Language]] = {
 """Name to a maker of voices, by the novelty of who speaks."""
 GROWTH = 3 * 2**30
 """Bytes by which a worker may grow before it is ended and another one begun."""
-LATER: Mapping[str, object] = {"rooms": True, "ood": 0, "own": ""}
+LATER: Mapping[str, object] = {"rooms": True, "ood": 0, "own": "", "storeys": 1}
 """Settings that data sets have not always had, with their defaults."""
 SEEDS = 12
 """House seeds tried before giving up on a house of the data set."""
@@ -67,6 +67,8 @@ class DatasetConfig:
     seed: int = 0
     area: tuple[float, float] = (150.0, 420.0)
     """Smallest and largest house, square metres."""
+    storeys: int = 1
+    """Of every house, 1 to 3."""
     routes: str = "sampled"
     """'sampled', as in Room-to-Room."""
     people: bool = True
@@ -321,7 +323,9 @@ def _write_unit(
 ) -> None:
     novelty = config.novelty_of(unit.group)
     language = VOICES[config.language](novelty)
-    house, graph = make_house(config.seed, unit.name, HouseConfig(area=config.area, novelty=novelty), catalogue)
+    house, graph = make_house(
+        config.seed, unit.name, HouseConfig(area=config.area, storeys=config.storeys, novelty=novelty), catalogue
+    )
     house_split = {"extra": "train", "ood": "test"}.get(unit.group, unit.group)
     paths: list[tuple[int, ...]] = []
     kind = config.task_kind
