@@ -37,6 +37,7 @@ from embodied.envs.continuous import (
 )
 from embodied.interface import FindInTurn, FollowRoute, Place, Task
 from embodied.mattersim.conventions import tokenised
+from embodied.navigation.free_space import EYE
 from embodied.seeds import stream
 from embodied.tasks.goals import GOAT_REACH, find_instances
 
@@ -100,8 +101,7 @@ def route_episodes(tasks: Iterable[Task], places: Mapping[str, Place]) -> list[C
     for number, task in enumerate(tasks, 1):
         assert isinstance(task.goal, FollowRoute), "VLN tasks follow routes"
         place = places[task.world]
-        floor = float(place.house.storeys[0].elevation)
-        path = tuple((float(x), float(y), floor) for x, y, _ in place.graph.positions[list(task.goal.path)])
+        path = tuple((float(x), float(y), float(z) - EYE) for x, y, z in place.graph.positions[list(task.goal.path)])
         start, goals, route = (path[0], task.start.yaw), (NavigationGoal(path[-1]),), task.goal.route
         episodes.append(
             ContinuousEpisode(str(number), task.world, *start, task.request, goals, task.radius, path, trajectory=route)
@@ -118,7 +118,7 @@ def object_episodes(
       ValueError: the house has no object far enough from any start.
     """
     ground, episodes, far = (navmeshes or NavMeshCache()).of(place.house), [], {}
-    floor, rng = float(place.house.storeys[0].elevation), stream(seed, "objectnav", place.name)
+    rng = stream(seed, "objectnav", place.name)
     for name in sorted({p.object_class for p in place.house.placements}):
         if goals := seen_from(place.house, ground, name, REACH):
             cells = [ground.cell_at(np.array(v)) for a in goals for v in a.views]
@@ -132,9 +132,9 @@ def object_episodes(
     for number in range(count):
         name = names[int(rng.integers(len(names)))]
         goals, starts = far[name]
-        x, y = ground.xy[int(rng.choice(starts))]
+        x, y, z = ground.xyz[int(rng.choice(starts))]
         yaw = float(rng.uniform(-math.pi, math.pi))
-        start = (float(x), float(y), floor)
+        start = (float(x), float(y), float(z))
         episodes.append(ContinuousEpisode(str(number), place.name, start, yaw, name, goals, AT_VIEW, object_class=name))
     return episodes
 
@@ -207,10 +207,10 @@ def write_goat(folder: Path, split: str, tasks: Iterable[Task], places: Mapping[
                 known = things.setdefault(thing, _goat_goal(place, thing, goal.category, nodes[thing]))
                 if goal.form == "description":
                     known["lang_desc"] = goal.words.removeprefix("find ")
-        start, floor = place.graph.positions[task.start.node], float(place.house.storeys[0].elevation)
+        start = place.graph.positions[task.start.node] - [0.0, 0.0, EYE]
         in_turn = [[g.category, g.form, None if g.form == "object" else g.placements[0]] for g in task.goal.goals]
         one: dict[str, Any] = {"episode_id": str(len(episodes)), "scene_id": f"embodied/{name}/{name}.glb"}
-        one |= {"start_position": to_habitat((*start[:2], floor)), "start_rotation": rotation_of(task.start.yaw)}
+        one |= {"start_position": to_habitat(start), "start_rotation": rotation_of(task.start.yaw)}
         episodes.append(one | {"info": {}, "goals": [], "tasks": in_turn})
     home = Path(folder) / split
     written = [_write(home / f"{split}.json.gz", {"episodes": [], "goals": {}})]
@@ -222,10 +222,10 @@ def write_goat(folder: Path, split: str, tasks: Iterable[Task], places: Mapping[
 
 def _goat_goal(place: Place, thing: str, category: str, nodes: Sequence[int]) -> dict[str, Any]:
     """A thing that may be looked for, its viewpoints and a picture from the nearest of them."""
-    p, floor, states = place.house.placement_by_id[thing], float(place.house.storeys[0].elevation), []
-    for x, y, _ in place.graph.positions[list(nodes)]:
+    p, states = place.house.placement_by_id[thing], []
+    for x, y, z in place.graph.positions[list(nodes)]:
         rotation = rotation_of(math.atan2(p.position[1] - y, p.position[0] - x))
-        states.append({"position": to_habitat((x, y, floor)), "rotation": rotation})
+        states.append({"position": to_habitat((x, y, z - EYE)), "rotation": rotation})
     eye = {"position": to_habitat(place.graph.positions[nodes[0]]), "rotation": states[0]["rotation"]}
     about: dict[str, Any] = {"object_category": category, "object_id": thing, "position": to_habitat(p.position)}
     views = [{"agent_state": state, "iou": None} for state in states]

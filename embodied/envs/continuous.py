@@ -182,11 +182,16 @@ class ContinuousEnv:
         self.episode, self.place = episode, place
         self.ground = self._grounds.of(place.house)
         check_on_floor(episode, place.house, self.ground, self.body.forward)
-        self._ajar = {o.id: np.add(o.a, o.b) / 2 for o in place.house.openings if o.id in ajar_doors(place.house)}
+        self._ajar = {
+            o.id: self.ground.plane(np.append(np.add(o.a, o.b) / 2, place.house.floor_height(o)))
+            for o in place.house.openings
+            if o.id in ajar_doors(place.house)
+        }
         self.pushed = frozenset[str]()
         """Doors that stood ajar and were pushed open."""
         self.ways = self.ground.ways(goal_cells(episode, self.ground))
-        self.position = self.ground.nearest_free(np.array(episode.start[:2]))
+        self.position = self.ground.nearest_free(self.ground.plane(np.array(episode.start)))
+        """(2,) metres, in the plane of `ground`."""
         self.yaw, self.tilt, self.collided, self.collisions, self.ended = episode.yaw, 0, False, 0, False
         self._actions: list[int] = []
         self._poses = [(*self.position, self.yaw, self.tilt)]
@@ -236,13 +241,14 @@ class ContinuousEnv:
 
     @property
     def floor(self) -> float:
-        """Height of the floor, metres."""
-        return float(self.place.house.storeys[0].elevation)
+        """Height of the floor, or of the stair, metres."""
+        return float(self.ground.world(self.position)[2])
 
     @property
     def eye(self) -> Point:
         """Position of the camera, metres, world."""
-        return float(self.position[0]), float(self.position[1]), self.floor + self.body.eye
+        x, y, z = self.ground.world(self.position).tolist()
+        return x, y, z + self.body.eye
 
     @property
     def pitch(self) -> float:
@@ -257,7 +263,7 @@ class ContinuousEnv:
     def trajectory(self) -> ContinuousTrajectory:
         """The way since the last reset, in straight lines between consecutive positions."""
         poses, first = np.array(self._poses, float), min(1, self.steps)
-        positions = np.column_stack([poses[:, :2], np.full(len(poses), self.floor)])
+        positions = self.ground.world(poses[:, :2])
         metres = np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))
         way: dict[str, Any] = {"positions": positions, "yaws": poses[:, 2], "pitches": poses[:, 3].astype(int)}
         return ContinuousTrajectory(
@@ -291,16 +297,16 @@ def check_on_floor(episode: ContinuousEpisode, house: House, ground: FloorWays, 
     """
     if not episode.goals:
         raise ValueError(f"episode {episode.id!r} has no goal; every episode needs one")
-    floor = float(house.storeys[0].elevation)
     places = {"start": (episode.start,), **{f"goal {k}": g.points for k, g in enumerate(episode.goals)}}
     for name, points in places.items():
         xyz = np.array(points, float)
-        away = np.linalg.norm(xyz[:, :2] - ground.xy[ground.cells_at(xyz[:, :2])], axis=1)
-        if not (np.hypot(away, xyz[:, 2] - floor) <= step).any():
-            low, high = ground.xy.min(0).round(1).tolist(), ground.xy.max(0).round(1).tolist()
+        away = np.linalg.norm(xyz - ground.xyz[ground.cells_at(xyz)], axis=1)
+        if not (away <= step).any():
+            low, high = ground.xyz[:, :2].min(0).round(1).tolist(), ground.xyz[:, :2].max(0).round(1).tolist()
+            floor = " or ".join(f"{s.elevation:g}" for s in house.storeys)
             raise ValueError(
                 f"the {name} of episode {episode.id!r} is at {xyz[0].round(2).tolist()}, where nobody can stand in "
-                f"house {house.name!r}: its floor goes from {low} to {high} at height {floor:g}; expected metres, z "
+                f"house {house.name!r}: its floor goes from {low} to {high} at height {floor}; expected metres, z "
                 "up, which in Habitat's files are [x, z, -y], y up"
             )
 
@@ -312,12 +318,12 @@ def goal_cells(episode: ContinuousEpisode, ground: FloorWays) -> np.ndarray:
 
 def seen_from(house: House, ground: FloorWays, object_class: str, reach: float) -> tuple[NavigationGoal, ...]:
     """The objects of a class that can be come near to, with the cells in their rooms within `reach` metres of them."""
-    floor, goals = float(house.storeys[0].elevation), []
+    goals = []
     for p in house.placements:
         if p.object_class != object_class or object_class in NOT_OBJECTS:
             continue
-        near = (footprint_distance(p, ground.xy) <= reach) & (ground.room_of_cell == p.room)
-        views = tuple((float(x), float(y), floor) for x, y in ground.xy[near])
+        near = (footprint_distance(p, ground.xyz[:, :2]) <= reach) & (ground.room_of_cell == p.room)
+        views = tuple((float(x), float(y), float(z)) for x, y, z in ground.xyz[near])
         if views:
             x, y, z = (float(v) for v in p.position)
             goals.append(NavigationGoal((x, y, z), views, p.id))

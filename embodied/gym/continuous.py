@@ -207,7 +207,7 @@ class ContinuousGymEnv(LiveEnv):
 
     def odometry(self) -> np.ndarray:
         """(5,) float32 of embodied.envs.continuous.POSITION."""
-        return odometry(self.play.episode, self.play.position, self.play.yaw, self.play.pitch)
+        return odometry(self.play.episode, np.array(self.play.eye), self.play.yaw, self.play.pitch)
 
     def expert(self, *, along: bool = False) -> ShortestPathFollower:
         """Who knows the way from wherever the body is, for training."""

@@ -157,7 +157,8 @@ class Driving:
         name = self._names[int(rng.integers(len(self._names)))] if world is None else world
         self.world = self.worlds[name]
         if name not in self._stages:
-            self._stages[name] = Driver(self.world.house, self.world.catalogue), FloorWays(self.world.house)
+            house = self.world.house
+            self._stages[name] = Driver(house, self.world.catalogue), FloorWays(house, stairs=False)
         self._stages.move_to_end(name)
         if len(self._stages) > KEPT:
             self.worlds[self._stages.popitem(last=False)[0]].close()

@@ -23,6 +23,7 @@ from embodied.assets.decoding import jpeg
 from embodied.envs.continuous import Body, NavMeshCache
 from embodied.errors import UnableError
 from embodied.interface import Place, Pose
+from embodied.navigation.free_space import EYE
 from embodied.render.camera import camera_at
 from embodied.render.panorama_file import PanoramaFile, beside
 from embodied.world import World
@@ -47,17 +48,12 @@ class BrowserBody:
     """The body of somebody who drives, in one episode. Where it is follows from the order of its actions."""
 
     def __init__(self, place: Place, pose: Pose, grounds: NavMeshCache) -> None:
-        """
-        Raises:
-          ValueError: a house of several storeys, whose stairs cannot be driven.
-        """
-        if len(place.house.storeys) > 1:
-            raise ValueError(f"house {place.house.name!r} has several storeys, which cannot be driven; use viewpoints")
         self._graph, self._ground = place.graph, grounds.of(place.house)
-        self._height = float(place.house.storeys[0].elevation) + BODY.eye
+        nodes = np.asarray(place.graph.positions)
+        self._nodes = self._ground.plane(nodes - [0.0, 0.0, EYE])
         self._world, self.yaw, self._here = place.name, pose.yaw, pose.node
-        self.position = self._ground.nearest_free(np.asarray(place.graph.positions)[pose.node, :2])
-        """(2,) metres."""
+        self.position = self._ground.nearest_free(self._nodes[pose.node])
+        """(2,) metres, in the plane of the ways."""
 
     def act(self, action: int) -> int:
         """Do one of ACTIONS; the viewpoint where the body is now: the nearest that it could go straight to."""
@@ -66,16 +62,16 @@ class BrowserBody:
             self.position = self._ground.moved(self.position, self.position + ahead, sliding=True)
         else:
             self.yaw += math.radians(BODY.turn) * (1 if action == 1 else -1)
-        nodes = np.asarray(self._graph.positions)[:, :2]
-        away = np.linalg.norm(nodes - self.position, axis=1)
-        straight = self._ground.is_free(self.position, nodes)
+        away = np.linalg.norm(self._ground.world(self._nodes) - self._ground.world(self.position), axis=1)
+        straight = self._ground.is_free(self.position, self._nodes)
         straight[self._here] = True
         self._here = int(np.argmin(np.where(straight, away, np.inf)))
         return self._here
 
     @property
     def eye(self) -> Eye:
-        return self._world, float(self.position[0]), float(self.position[1]), self._height, self.yaw
+        x, y, z = self._ground.world(self.position).tolist()
+        return self._world, x, y, z + BODY.eye, self.yaw
 
 
 class Live:

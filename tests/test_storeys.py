@@ -1,0 +1,174 @@
+"""Houses of several storeys: stairs that one can climb, that nothing stands on, and from which nobody falls."""
+
+from __future__ import annotations
+
+import functools
+import json
+from types import SimpleNamespace
+
+import mujoco
+import numpy as np
+import pytest
+import shapely
+
+from embodied.assets.catalogue import load_catalogue
+from embodied.envs.continuous import ContinuousEnv, ContinuousEpisode, NavigationGoal, ShortestPathFollower
+from embodied.generate import STAGES, HouseConfig, generate_house
+from embodied.generate.plan_file import house_of_plan, load_plan
+from embodied.generate.stairwell import fitting
+from embodied.house.house import House, HouseError
+from embodied.house.shapes import footprint, room_at, well_of
+from embodied.language.clauses import DOWN, UP, Climb
+from embodied.language.grammar import Phrase, parse, say
+from embodied.language.lexicon import lexicon_of
+from embodied.language.route_clauses import legs_of
+from embodied.language.templates import SPEAKERS
+from embodied.navigation.connectivity import from_matterport, to_matterport
+from embodied.navigation.free_space import EYE
+from embodied.navigation.graph import build_graph, stair_ends
+from embodied.scene.model import COLLISION, build_spec
+from embodied.scene.stairs import flights_of
+
+SEEDS = (0, 1)
+BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "clear")}
+OWN = """{"rooms": [
+ {"kind": "hall", "polygon": [[0, 0], [2.4, 0], [2.4, 4], [0, 4]]},
+ {"kind": "stairwell", "polygon": [[0, 4], [2.4, 4], [2.4, 8.4], [0, 8.4]]},
+ {"kind": "living_room", "polygon": [[2.4, 0], [8, 0], [8, 8.4], [2.4, 8.4]]},
+ {"kind": "stairwell", "polygon": [[0, 4], [2.4, 4], [2.4, 8.4], [0, 8.4]], "storey": 1},
+ {"kind": "corridor", "polygon": [[0, 2.6], [8, 2.6], [8, 4], [0, 4]], "storey": 1},
+ {"kind": "main_bedroom", "polygon": [[2.4, 4], [8, 4], [8, 8.4], [2.4, 8.4]], "storey": 1},
+ {"kind": "bathroom", "polygon": [[0, 0], [8, 0], [8, 2.6], [0, 2.6]], "storey": 1}]}"""
+
+
+@functools.cache
+def house_of(seed: int, storeys: int = 2, *, bare: bool = False) -> House:
+    return generate_house(seed, HouseConfig(storeys=storeys), stages=BARE if bare else STAGES)
+
+
+@pytest.fixture(params=SEEDS)
+def house(request) -> House:
+    return house_of(request.param)
+
+
+@pytest.mark.parametrize("storeys", [2, 3])
+def test_each_storey_has_a_bath_bedrooms_lie_upstairs_and_walls_stand_on_those_below(storeys):
+    house = house_of(2, storeys, bare=True)
+    assert len(house.storeys) == storeys and house.digest == House.from_json(house.to_json()).digest
+    outlines = []
+    for k in range(storeys):
+        rooms = [r for r in house.rooms if r.storey == k]
+        assert {"bathroom", "toilet"} & {r.kind for r in rooms}
+        assert k or not any(r.kind in ("main_bedroom", "kids_room") for r in rooms)
+        outlines.append(shapely.union_all([shapely.Polygon(r.polygon) for r in rooms]).buffer(0.01))
+    assert all(above.difference(below).area < 0.05 for below, above in zip(outlines, outlines[1:]))
+
+
+@pytest.mark.parametrize("wide, deep, bends", [(2.2, 4.2, 2), (3.8, 4.4, 1), (6.4, 4.4, 0)])
+def test_flights_are_straight_turn_once_or_double_back(wide, deep, bends):
+    flights = fitting(wide, deep, 1.2)
+    assert flights is not None and sum(a[2] == b[2] for a, b in zip(flights.path, flights.path[1:])) - bends in (0, 1)
+    assert fitting(1.8, deep, 1.2) is None
+
+
+def test_steps_are_of_usual_size_and_nothing_is_above_them(house):
+    (stair,) = house.stairs
+    for f in flights_of(stair):
+        assert 0.25 <= f.going <= 0.32 and 0.16 <= f.rise <= 0.19
+        beside = [f.at(0, 0)[:2], f.at(f.length, 0)[:2]]
+        assert well_of(stair).buffer(0.02).covers(shapely.LineString(beside).buffer(f.width / 2, cap_style="flat"))
+
+
+def test_nothing_stands_on_stairs_or_where_one_comes_to_them(house):
+    (stair,) = house.stairs
+    for room, end in zip(stair.rooms, stair_ends(stair)):
+        storey = house.storey_of(house.room_by_id[room])
+        free = well_of(stair).union(shapely.Point(end[:2]).buffer(0.4)).buffer(-0.02)
+        low = [p for p in house.placements if p.room == room and p.position[2] < storey.elevation + 2.0]
+        assert not [p.id for p in low if footprint(p).intersects(free) and p.size[2] > 0.04]
+        assert room_at(house, [*end[:2], storey.elevation + 0.1]) == room
+    for o in house.openings:
+        if o.kind in ("door", "passage") and {*o.rooms} & {*stair.rooms}:
+            assert shapely.LineString([o.a, o.b]).distance(well_of(stair)) > 0.05, "it opens over treads"
+
+
+def test_one_stands_on_every_tread_and_nobody_falls_from_an_edge(house):
+    (stair,), rng = house.stairs, np.random.default_rng(0)
+    model = build_spec(house, load_catalogue()).compile()
+    data, hit = mujoco.MjData(model), np.zeros(1, np.int32)
+    mujoco.mj_forward(model, data)
+    groups = np.arange(6) == COLLISION
+    ray = lambda a, d: mujoco.mj_ray(model, data, a, d, groups.astype(np.uint8), 1, -1, hit)
+    for f in flights_of(stair):
+        for k in range(f.risers - 1):
+            tread = f.at((k + 0.5) * f.going, 0.0, (k + 1) * f.rise)
+            assert ray(tread + [0, 0, 1.9], np.array([0, 0, -1.0])) == pytest.approx(1.9, abs=1e-3)
+    upper = house.room_by_id[stair.rooms[1]]
+    z, well = house.storey_of(upper).elevation, well_of(stair)
+    head = shapely.Point(stair.path[-1][:2]).buffer(stair.width / 2 + 0.1)
+    edge = well.exterior.intersection(house.floor(upper).buffer(-0.1)).difference(head)
+    for s in rng.uniform(0, edge.length, 40) if edge.length else ():
+        p = np.array(edge.interpolate(s).coords[0]) if edge.geom_type == "LineString" else None
+        if p is not None:
+            inward = np.array(well.centroid.coords[0]) - p
+            inward = np.append(inward / np.linalg.norm(inward), 0.0)
+            assert 0 <= ray(np.append(p, z + 0.5) - 0.3 * inward, inward) < 0.6, "an edge without a railing"
+
+
+def test_viewpoints_lie_on_the_stairs_and_come_back_from_matterports_file(house, tmp_path):
+    graph = build_graph(house)
+    floors = graph.positions[:, 2] - EYE
+    on_stairs = np.abs(floors[:, None] - [s.elevation for s in house.storeys]).min(1) > 0.1
+    assert on_stairs.any() and {*graph.room_of_node} == {r.id for r in house.rooms}
+    slopes = np.ptp(graph.positions[graph.edges][..., 2], axis=1) > 0.1
+    assert on_stairs[graph.edges[slopes]].any(1).all()
+    to_matterport(graph, house, tmp_path / "x_connectivity.json")
+    again = from_matterport(tmp_path / "x_connectivity.json")
+    assert np.allclose(again.positions, graph.positions) and np.array_equal(again.edges, graph.edges)
+
+
+def test_a_body_of_vlnce_climbs_in_ordinary_steps(house):
+    graph, env = build_graph(house), ContinuousEnv()
+    heights = graph.positions[:, 2]
+    for a, b in ((int(heights.argmin()), int(heights.argmax())), (int(heights.argmax()), int(heights.argmin()))):
+        path = tuple(tuple((graph.positions[n] - [0, 0, EYE]).tolist()) for n in graph.path(a, b))
+        goal = (NavigationGoal(path[-1]),)
+        place = SimpleNamespace(house=house, graph=graph)
+        env.reset(ContinuousEpisode("1", house.name, path[0], 0.0, "", goal, 1.0, path), place)
+        expert = ShortestPathFollower(env, along=True)
+        while not env.ended:
+            env.step(expert.action())
+        walked = env.trajectory()
+        assert walked.success and np.abs(np.diff(walked.positions[:, 2])).max() < 0.3
+        assert 0.7 * graph.distance[a, b] < walked.shortest <= graph.distance[a, b] + 0.5
+
+
+def test_stairs_are_spoken_of_as_one_stretch_and_read_back():
+    house, lexicon = house_of(1), lexicon_of(load_catalogue())
+    graph = build_graph(house)
+    a, b = (int(graph.positions[:, 2].argmin()), int(graph.positions[:, 2].argmax()))
+    for path, way in ((graph.path(a, b), UP), (graph.path(b, a), DOWN)):
+        legs = legs_of(SimpleNamespace(house=house, graph=graph), path, 0.0)
+        assert [leg.climb for leg in legs if leg.climb] == [way]
+        assert [n for leg in legs for n in leg.nodes[1:]] == list(path[1:])
+    rng = np.random.default_rng(0)
+    for clause in (Climb(UP), Climb(DOWN), Climb(UP, half=True)):
+        for speaker in SPEAKERS:
+            assert parse(say([Phrase(clause)], speaker, rng=rng), lexicon).clauses == (clause,)
+
+
+def test_a_plan_of_ones_own_has_stairs_where_two_storeys_have_the_same_stairwell(tmp_path):
+    file = tmp_path / "plan.json"
+    file.write_text(OWN)
+    house = house_of_plan(load_plan(file), seed=3)
+    assert len(house.storeys) == 2 and house.stairs[0].rooms == ("stairwell_1", "stairwell_2")
+    build_graph(house)
+    plan = json.loads(OWN)
+    plan["rooms"][3]["polygon"] = [[0, 4], [2.4, 4], [2.4, 8.2], [0, 8.2]]
+    file.write_text(json.dumps(plan))
+    with pytest.raises(HouseError, match="needs one room of kind 'stairwell'"):
+        load_plan(file)
+    plan["rooms"][1]["polygon"] = plan["rooms"][3]["polygon"] = [[0, 4], [2.4, 4], [2.4, 6], [0, 6]]
+    file.write_text(json.dumps(plan))
+    with pytest.raises(HouseError, match="no stair fits"):
+        load_plan(file)
