@@ -14,7 +14,7 @@ import tempfile
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 log = logging.getLogger(__name__)
@@ -112,14 +112,10 @@ def atomic_path(path: Path, *, sync: bool = True) -> Iterator[Path]:
         with drafts(path.parent) as private:
             temporary = private / path.name
             yield temporary
-            _replace(temporary, path, sync=sync)
-
-
-def _replace(temporary: Path, path: Path, *, sync: bool) -> None:
-    if sync:
-        with open(temporary, "rb") as f:
-            os.fsync(f.fileno())
-    os.replace(temporary, path)
+            if sync:
+                with open(temporary, "rb") as f:
+                    os.fsync(f.fileno())
+            os.replace(temporary, path)
 
 
 @contextlib.contextmanager
@@ -189,18 +185,6 @@ def write_bytes(path: Path, data: bytes) -> None:
     """Write `data` to `path` atomically."""
     with atomic_path(path) as temporary:
         temporary.write_bytes(data)
-
-
-def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files to `folder`, each of them atomically, by their names."""
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    sweep(folder)
-    with drafts(folder) as private:
-        for name, data in files.items():
-            with _named(folder / name):
-                (private / name).write_bytes(data)
-                _replace(private / name, folder / name, sync=True)
 
 
 def write_json(path: Path, value: object, indent: int | None = None) -> None:

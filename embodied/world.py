@@ -676,8 +676,10 @@ def gloss_of(bake: Bake, *, detail: bool = True, moving: MovingHouse | None = No
     Args:
       moving: the house as it is with what moves in it.
     """
-    from embodied.light.pages.gloss_data import gloss_data_of  # late: loads the path tracer
-    from embodied.light.tracing.rays import rays_among
+    from embodied.light.tracing.rays import (
+        gloss_data_of,  # late: loads the path tracer
+        rays_among,
+    )
     from embodied.render.gloss import Gloss
 
     if moving is not None:

@@ -17,7 +17,7 @@ from conftest import two_rooms
 from hand_data import built, content
 
 from embodied import cli
-from embodied.assets.cache import DRAFTS, MARK, abandoned, atomic_path, sweep, write_bytes, write_files
+from embodied.assets.cache import DRAFTS, MARK, abandoned, atomic_path, sweep, write_bytes
 from embodied.locks import LOCK, LockedError, locked
 
 HOLD = """
@@ -99,14 +99,12 @@ def test_what_a_killed_process_left_is_swept_and_what_others_write_or_own_stays(
     assert swept and set(tmp_path.rglob("*")) == mine - swept | {tmp_path / "b.json", tmp_path / "live"}
 
 
-def test_files_written_together_leave_nothing_unfinished_and_errors_name_theirs(tmp_path):
-    write_files(tmp_path / "house", {"a.json": b"{}", "b.npz": b"12"})
-    (tmp_path / "house" / "c").mkdir()
+def test_a_file_that_cannot_be_written_leaves_nothing_unfinished_and_the_error_names_it(tmp_path):
+    (tmp_path / "house" / "c").mkdir(parents=True)
     with pytest.raises(OSError) as error:
-        write_files(tmp_path / "house", {"b.npz": b"34", "c": b"56"})
+        write_bytes(tmp_path / "house" / "c", b"56")
     assert Path(error.value.filename) == tmp_path / "house" / "c"
-    assert {p.name for p in (tmp_path / "house").iterdir()} == {"a.json", "b.npz", "c"}
-    assert (tmp_path / "house" / "b.npz").read_bytes() == b"34"
+    assert {p.name for p in (tmp_path / "house").iterdir()} == {"c"}
 
 
 def test_whoever_takes_a_folder_finds_nothing_that_a_killed_process_left_in_it(tmp_path):

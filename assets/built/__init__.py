@@ -13,20 +13,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from embodied.assets import rows
-from embodied.assets.built import (
-    basics,
-    bath,
-    decor,
-    entry,
-    everyday,
-    fittings,
-    kitchen,
-    lamps,
-    papers,
-    soft,
-    storage,
-    tableware,
-)
+from embodied.assets.built import basics, bath, decor, entry, everyday, kitchen, lamps, papers, soft, storage, tableware
 from embodied.assets.built.parametric import LIGHTS, Build, ParametricAsset, built_parts, surface
 from embodied.assets.json_file import RecordError, from_plain
 from embodied.assets.materials import MATERIALS
@@ -34,7 +21,7 @@ from embodied.assets.records import Asset, SupportSurface
 from embodied.assets.rows import DATA, Row, check_classes, read_json, read_models
 
 BUILDS: Mapping[str, Build] = rows.made_in(
-    *(basics, bath, decor, entry, everyday, fittings, kitchen, lamps, papers, soft, storage, tableware)
+    *(basics, bath, decor, entry, everyday, kitchen, lamps, papers, soft, storage, tableware)
 )
 """Every builder by '<module>.<function>'."""
 SURFACES: Mapping[str, Callable[..., tuple[SupportSurface, ...]]] = MappingProxyType(

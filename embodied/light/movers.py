@@ -24,10 +24,9 @@ import numpy as np
 from embodied.geometry import r2
 from embodied.house.house import House
 from embodied.house.moment import RigidPose
-from embodied.light.pages.atlas import atlas_of, things_of
+from embodied.light.pages.atlas import atlas_of, meshes_of, things_of
 from embodied.light.pages.colours import ColourMaps, albedo
 from embodied.light.pages.cover import cover, sources
-from embodied.light.pages.meshes import meshes_of
 from embodied.light.probes import CORNERS, LOBE, ORDERS, harmonics
 from embodied.light.settings import LightSettings
 from embodied.light.tracing.emitters import Lamp

@@ -23,10 +23,10 @@ from embodied.house.shapes import room_at
 from embodied.light.movers import Placed, Surface, SurfacePage, shading, surface_of
 from embodied.light.moving_pages import BODIES, HousePages, Patch
 from embodied.light.pages.files import Bake
-from embodied.light.pages.gloss_data import gloss_data_of
 from embodied.light.pages.tone import displayed
 from embodied.light.probes import turned
 from embodied.light.settings import LightSettings
+from embodied.light.tracing.rays import gloss_data_of
 from embodied.render.gloss import GlossData
 from embodied.scene.cupboards import lit_apart
 from embodied.scene.house_meshes import object_parts

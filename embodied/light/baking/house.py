@@ -31,7 +31,7 @@ from embodied.light.baking.solve import BakeInput, Radiosity, solve
 from embodied.light.baking.stages import facts_of, kept_light
 from embodied.light.baking.surroundings import Outside, daylit, dome_mesh, outside_of
 from embodied.light.pages import tone
-from embodied.light.pages.atlas import Atlas, atlas_of, coarsened, things_of
+from embodied.light.pages.atlas import Atlas, atlas_of, coarsened, meshes_of, things_of
 from embodied.light.pages.colours import ColourMaps
 from embodied.light.pages.files import (
     PROBES,
@@ -43,7 +43,6 @@ from embodied.light.pages.files import (
     reopened,
     write_pages,
 )
-from embodied.light.pages.meshes import meshes_of
 from embodied.light.pages.tone import expose
 from embodied.light.settings import QUALITIES, LightSettings, light_code, settings_of
 from embodied.light.tracing.emitters import in_the_open, lamps_of, write_lamps

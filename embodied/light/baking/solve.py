@@ -288,12 +288,7 @@ def clamp_fireflies(lux: Luxels, seen: np.ndarray) -> np.ndarray:
 def _most(y: np.ndarray, area: np.ndarray) -> float:
     """The least brightness to which luxels can be cut where that loses at most `SPARKS` of their light."""
     allowed = SPARKS * float((y * area).sum())
-    tenth = len(y) // 10 + 1
-    bright = float(np.partition(y, -tenth)[-tenth])
-    top = np.nonzero(y >= bright)[0]
-    if float(((y[top] - bright) * area[top]).sum()) < allowed:  # too little is lost there: look at all
-        top = np.arange(len(y))
-    order = top[np.argsort(y[top])]
+    order = np.argsort(y)
     rising, above = y[order], np.cumsum(area[order][::-1])[::-1]
     lost = np.cumsum((np.diff(rising, append=rising[-1]) * np.append(above[1:], 0.0))[::-1])[::-1]
     return float(rising[min(int(np.searchsorted(-lost, -allowed)), len(rising) - 1)])

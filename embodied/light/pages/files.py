@@ -15,7 +15,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from embodied.assets.cache import write_files
+from embodied.assets.cache import write_bytes
 from embodied.assets.decoding import jpeg, load_record, open_arrays, packed, read_picture
 from embodied.assets.json_file import read_json
 from embodied.house.house import House
@@ -77,7 +77,7 @@ class Bake:
 
     @functools.cached_property
     def gloss(self) -> tuple[np.ndarray | None, ...]:
-        """(m, 4) uint8 of each mesh's faces, from `pages.meshes`; None where nothing is known of them."""
+        """(m, 4) uint8 of each mesh's faces, from `meshes_of`; None where nothing is known of them."""
         with open_arrays(self.folder / "meshes.npz") as z:
             known = np.split(z["gloss"], z["face_ends"][: int(z["glossy"]) - 1])
         return (*known, *[None] * (len(self.manifest["meshes"]) - len(known)))
@@ -157,14 +157,13 @@ def write_pages(
 ) -> None:
     """Pages by number: light as half floats, the sun as PNG, colours (the same at all hours) and picture as JPEG of
     `quality`."""
-    files = {}
     for i, page in pages.items():
         light, sun, shown, picture = page_files(i)
-        files[light] = packed({"soft": page.soft, "glow": page.glow})
-        files[sun] = cv2.imencode(".png", page.sun)[1].tobytes()
-        files[shown] = get_or_compute(memory, ("colours", i), functools.partial(jpeg, page.albedo, quality))
-        files[picture] = jpeg(page.picture, quality)
-    write_files(folder, files)
+        write_bytes(folder / light, packed({"soft": page.soft, "glow": page.glow}))
+        write_bytes(folder / sun, cv2.imencode(".png", page.sun)[1].tobytes())
+        colours = get_or_compute(memory, ("colours", i), functools.partial(jpeg, page.albedo, quality))
+        write_bytes(folder / shown, colours)
+        write_bytes(folder / picture, jpeg(page.picture, quality))
 
 
 def packed_meshes(meshes: Sequence[LitMesh], gloss: Sequence[np.ndarray]) -> bytes:
