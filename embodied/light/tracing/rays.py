@@ -1,5 +1,5 @@
-"""What pictures that are drawn elsewhere and reflect need of a lit house: first hits of rays among its bare triangles,
-with NumPy's arrays in and out, and its gloss."""
+"""Reflections of a lit house, for pictures that are drawn elsewhere: first hits of rays among its bare triangles, with
+NumPy's arrays in and out, and its gloss."""
 
 from __future__ import annotations
 
