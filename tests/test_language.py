@@ -16,7 +16,7 @@ from embodied.language.clauses import Enter, Exit, Metres, Notice, Past, StopBy,
 from embodied.language.grammar import Phrase, kind_of, normalised, parse, say
 from embodied.language.lexicon import ROOM_NOUNS, UNFIT, lexicon_of
 from embodied.language.listener import count_cost, follow
-from embodied.language.people_language import People, RouteDescriber
+from embodied.language.people_language import Landmarks, People, RouteDescriber
 from embodied.language.plain_language import detokenized, with_article
 from embodied.language.route_clauses import legs_of
 from embodied.language.surroundings import Lookout, doorway
@@ -107,6 +107,15 @@ def test_legs_cover_the_path_and_end_at_doorways(world, spoken):
 def test_the_listener_arrives_within_three_metres(world, spoken):
     missed = [world.graph.distance[follow(world, text, path[0], yaw).path[-1], path[-1]] for text, path, yaw in spoken]
     assert np.mean(np.array(missed) <= 3.0) >= 0.9
+
+
+def test_by_landmarks_a_seeing_listener_arrives_and_some_paths_need_no_eyes(world, spoken):
+    rng = np.random.default_rng(1)
+    told = [(Landmarks().route(world, path, yaw, rng=rng), path, yaw) for _, path, yaw in spoken]
+    told = [(text, path, yaw) for text, path, yaw in told if text]
+    assert 3 < len(told) < len(spoken)
+    missed = [world.graph.distance[follow(world, text, path[0], yaw).path[-1], path[-1]] for text, path, yaw in told]
+    assert np.mean(np.array(missed) <= 3.0) >= 0.8
 
 
 def test_the_instruction_of_another_route_leads_astray(world, spoken):

@@ -18,10 +18,11 @@ from embodied.agents.common.weights import CheckpointError
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vnla.agent import ASKED, LEARNED, TEACHER, VnlaAgent, rules_of
 from embodied.agents.vnla.config import TRAINED_UNDER
-from embodied.agents.vnla.looking import READING, turned
+from embodied.agents.vnla.looking import READING, lessons_of, turned
 from embodied.agents.vnla.network import ASK, DONT, MOST_LEFT, NO_ASK, NO_MOVE, STOP, VnlaPercept
 from embodied.agents.vnla.policy import VnlaMoment, _decided, carried_out, for_training
 from embodied.agents.vnla.run import VnlaLearner, losses_of
+from embodied.assets.records import ROOM_KINDS
 from embodied.envs.vnla import RULES_OF_PLAY
 from embodied.evaluation.evaluate import play
 from embodied.interface import Ask
@@ -48,6 +49,19 @@ def test_no_gradient_leaves_the_asking_head():
     asks.sum().backward()
     touched = {name.split(".")[0] for name, p in network.named_parameters() if p.grad is not None and p.grad.any()}
     assert touched == {"asking"}
+
+
+def test_readers_are_taught_which_rooms_lie_where():
+    agent, training, _ = lesson()
+    ((_, words, _, ways, asked, here, ends, onward),) = lessons_of(training, agent.vocabulary)
+    kitchen, bedroom, bathroom = (ROOM_KINDS.index(k) for k in ("kitchen", "bedroom", "bathroom"))
+    beside = 2 + 6  # the kitchen's node before the door to the bedroom, which lies towards +x
+    east = torch.isin(torch.arange(12), torch.tensor([11, 0, 1]))
+    assert here[beside] == kitchen and ways[beside].all()
+    assert (ends[beside] == torch.where(east, bedroom, kitchen)).all()
+    assert onward[beside, bedroom, east].sum() > 0.99 and not onward[beside, kitchen].any()
+    assert onward[beside, bathroom, ~east].sum() > 0.99  # over the living room
+    assert {agent.vocabulary.words[w] for w in words[asked == bathroom].flatten()} >= {"bathroom"}
 
 
 @pytest.mark.slow

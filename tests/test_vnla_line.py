@@ -9,7 +9,6 @@ from hand_data import COMPACT, built, noise_features, small_house, validations_o
 
 from embodied.agents.vnla.agent import VnlaAgent
 from embodied.cli import main
-from embodied.records import read_finished
 
 pytestmark = pytest.mark.slow
 
@@ -73,10 +72,6 @@ def test_the_tables_of_the_paper_from_one_command(data, tmp_path):
     text = (tmp_path / "vnla-askers.md").read_text()
     assert "| teacher |" in text and f"| {LISTENER} |" in text and "(34.95)" in text
     assert "Not run: none, first, random, none, blind, learned, blind, scripted listener asking as the teacher." in text
-    printed = ("study", "vnla", "algorithm-6", *words[3:], "--rows", "Algorithm 6, learned")
-    assert run(*printed) == 0 and "| Algorithm 6, learned |" in (tmp_path / "vnla-algorithm-6.md").read_text()
-    (trained,) = tmp_path.glob("runs/rules_algorithm_6*/trained.json")
-    assert read_finished(trained)[0]["settings"]["rules"] == "algorithm-6"
 
 
 def test_a_rule_of_play_is_chosen_on_the_command_line(data, capsys):

@@ -54,8 +54,9 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     source, agent = evaluation_data(data, how), VlnAgent.load(file)
 
     def of_split(split: str) -> Players:
-        whole, learned = data.split(split), agent.policy(source.split(split).bank)
-        rows = {"learned": (whole, learned), **{name: (whole, make()) for name, make in PLAIN_AGENTS.items()}}
+        whole, bank = data.split(split), source.split(split).bank
+        agents = {"learned": agent.policy(bank), "learned, blind": agent.policy(bank.blind())}
+        rows = {name: (whole, one) for name, one in [*agents.items(), *((n, m()) for n, m in PLAIN_AGENTS.items())]}
         return Players(rows, PLAIN_AGENTS, f"trained on pictures {agent.about.pictures}")
 
     return of_split

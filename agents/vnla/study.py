@@ -37,7 +37,6 @@ def _table(title: str, *rows: StudyRow, compared: Sequence[tuple[StudyRow, Study
 NONE, RANDOM_ASKER, LEARNED_ASKER = _row("none", NEVER), _row("random", AT_RANDOM), _row("learned")
 BLIND_NONE, BLIND_ASKER = _row("none, blind", NEVER, blind=True), _row("learned, blind", blind=True)
 LISTENER = StudyRow("scripted listener asking as the teacher", None, {"played": "listener, teacher"})
-PROGRAM, ALGORITHM_6 = _row("program's rules, learned"), _row("Algorithm 6, learned", rules="algorithm-6")
 VNLA_TABLES: Mapping[str, StudyTable] = {
     "askers": _table(
         "Who decides when to ask",
@@ -58,18 +57,6 @@ VNLA_TABLES: Mapping[str, StudyTable] = {
         _row("direct, in words", DIRECT),
         _row("indirect"),
     ),
-    "algorithm-6": StudyTable(
-        "Algorithm 6 as printed beside the program's rules of play (docs/sources.md, S43)",
-        (
-            _row("program's rules, asks at random", asker="random"),
-            PROGRAM,
-            _row("Algorithm 6, asks at random", asker="random", rules="algorithm-6"),
-            ALGORITHM_6,
-        ),
-        (*VNLA_MEASURES, "steps"),
-        TEST_SPLITS,
-        ((ALGORITHM_6, PROGRAM),),
-    ),
     "rules": _table(
         "Rules of the asking teacher",
         _row("a and e", ask_rules="a and e"),
@@ -77,7 +64,7 @@ VNLA_TABLES: Mapping[str, StudyTable] = {
         _row("all"),
     ),
 }
-"""The paper's Tables 2, 3 and 7, and the dissertation's own algorithm, which nobody has printed results of."""
+"""The paper's Tables 2, 3 and 7."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -71,7 +71,8 @@ def build_routes(world: PlaceT, *, seed: int, language: Language[PlaceT], house_
 def worded(
     world: PlaceT, paths: list[tuple[int, ...]], wordings: tuple[str, ...], *, seed: int, language: Language[PlaceT]
 ) -> tuple[Route, ...]:
-    """Routes along `paths`: a random first heading, and a text per wording, no two alike if it can be helped."""
+    """Routes along the `paths` that `language` has words for: a random first heading, a text per wording, all unalike
+    if it can be helped."""
     used: set[str] = set()
     routes = []
     for p, path in enumerate(paths):
@@ -83,5 +84,6 @@ def worded(
                 if text not in used:
                     break
             used.add(text)
-            routes.append(Route(f"{world.house.name}_{p}_{k}", path, turn, 0, text, split))
+            if text:
+                routes.append(Route(f"{world.house.name}_{p}_{k}", path, turn, 0, text, split))
     return tuple(routes)

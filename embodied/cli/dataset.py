@@ -51,8 +51,9 @@ class DatasetOptions(Furnished, Printed):
     """Size of the houses in square metres."""
     storeys: Annotated[int, Option(whole(1, 3), "N")] = 1
     """Storeys of every house (all kinds but vqa)."""
-    language: Annotated[str, Option(words=("people", "plain"))] = "people"
-    """Wording of the routes: varied, with habits and landmarks (people), or plain turns and rooms (plain)."""
+    language: Annotated[str, Option(words=("people", "landmarks", "plain"))] = "people"
+    """Wording of the routes: varied, with habits and landmarks (people), always with landmarks, of paths on which turns
+    alone lead astray (landmarks), or plain turns and rooms (plain)."""
     no_rooms: bool = False
     """Requests name no room: any such object in the house will do (VNLA)."""
     ood: Annotated[int, Option(whole(0, HOUSES), "N")] = 0

@@ -27,7 +27,7 @@ from embodied.house.house import House, HouseError
 from embodied.interface import Language
 from embodied.kinds.splits import DATASET_SCALES, DatasetSize, SplitPlan
 from embodied.kinds.task_kind import TaskInputs, TaskKind, kind_named
-from embodied.language import People, PlainLanguage
+from embodied.language import Landmarks, People, PlainLanguage
 from embodied.locks import LOCK, locked
 from embodied.navigation.connectivity import from_matterport, to_matterport
 from embodied.navigation.graph import NavGraph, build_graph
@@ -41,6 +41,7 @@ VERSION = 1
 """Of the layout and meaning of a data set's files; another version is refused."""
 VOICES: Mapping[str, Callable[[str | None], Language]] = {
     "people": lambda novelty: People(novelty=novelty),
+    "landmarks": lambda novelty: Landmarks(novelty=novelty),
     "plain": lambda novelty: PlainLanguage(),
 }
 """Name to a maker of voices, by the novelty of who speaks."""
@@ -74,7 +75,8 @@ class DatasetConfig:
     people: bool = True
     """Assistants stand in the house as figures (HANNA)."""
     language: str = "people"
-    """Who words the routes: 'people' with their habits and landmarks, or 'plain' turns and rooms."""
+    """Who words the routes: 'people' with their habits and landmarks, 'landmarks' of paths on which turns alone lead
+    astray, or 'plain' turns and rooms."""
     rooms: bool = True
     """Requests name the room; without (VNLA), any thing of the class in the house will do."""
     ood: int = 0
@@ -88,6 +90,8 @@ class DatasetConfig:
             raise ValueError(f"routes should be 'sampled', got {self.routes!r}")
         if self.language not in VOICES:
             raise ValueError(f"language should be one of {sorted(VOICES)}, got {self.language!r}")
+        if self.language == "landmarks" and not self.task_kind.from_routes:
+            raise ValueError(f"landmarks word the tasks of vln, not of {self.kind!r}; use people or plain")
         if isinstance(self.scale, str) and self.scale not in DATASET_SCALES:  # as files have it
             try:
                 object.__setattr__(self, "scale", DatasetSize.of(self.scale))

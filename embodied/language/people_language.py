@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from embodied.interface import FindObject, Language, SeenPlace
+from embodied.language.clauses import STOPS, Forward, RouteInstruction, StopHere, Turn
 from embodied.language.grammar import parse, say
 from embodied.language.lexicon import lexicon_of
 from embodied.language.listener import carry_out
@@ -32,6 +34,9 @@ class People:
     would arrive (the rational speaker of ILIAD, dissertation 3.2.4), and says it otherwise if not.
     """
 
+    habits: Mapping[str, Any] = {}
+    """In which these speakers differ from others: fields of Speaker."""
+
     def __init__(self, tries: int = len(GROWTH), novelty: str | None = None) -> None:
         """
         Args:
@@ -53,7 +58,8 @@ class People:
           path: nodes to walk along.
           yaw: the walker's first direction, radians.
         """
-        speaker, lexicon, best, least = draw_speaker(rng, self.novelty), lexicon_of(world.catalogue), "", np.inf
+        speaker = dataclasses.replace(draw_speaker(rng, self.novelty), **self.habits)
+        lexicon, best, least = lexicon_of(world.catalogue), "", np.inf
         wanted = max(round(rng.normal(speaker.clauses - 1, 1.0)), 2)
         for more in GROWTH[: self.tries]:
             phrases = shortened(plan(world, path, yaw, speaker, rng=rng), wanted + more)
@@ -71,6 +77,20 @@ class People:
     def subgoal(self, words: Sequence[str]) -> str:
         """VNLA's sub-goals in words."""
         return self._plain.subgoal(words)
+
+
+class Landmarks(People):
+    """People who turn at what they see and count nothing, about paths on which turns alone lead astray."""
+
+    habits = {"landmarks": 1.0, "metres": 0.0, "counts": 0.0, "clauses": 9}
+
+    def route(self, world: SeenPlace, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
+        """As of People; '' for a path on which who hears only when to turn arrives."""
+        text = super().route(world, path, yaw, rng=rng)
+        heard = parse(text, lexicon_of(world.catalogue)).clauses
+        turns = [c if isinstance(c, Turn) else StopHere() if isinstance(c, STOPS) else Forward() for c in heard]
+        blindly = carry_out(Lookout(world), RouteInstruction(tuple(turns)), path[0], yaw).path
+        return text if world.graph.distance[blindly[-1], path[-1]] > ARRIVED else ""
 
 
 class RouteDescriber:
