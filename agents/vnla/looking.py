@@ -73,7 +73,6 @@ class Looker(Look):
         meant = torch.relu(look[:, None] * (1 + scale) + shift)
         there = self.there(torch.cat([meant.amax(2), meant.mean(2)], -1))
         leads = self.leads(_turns(meant).flatten(0, 1)).unflatten(0, there.shape[:2])[:, :, 0]
-
         around = F.dropout(torch.relu(turns + self.beside(turns)), self.dropout, self.training).transpose(1, 2)
         asked, here = self.asked(words), self.here(torch.cat([look.amax(1), look.mean(1)], -1))
         ends, onward = self.ends(around), self.onward(around)
