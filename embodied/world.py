@@ -198,8 +198,8 @@ class World:
             for i, x in openness(model, data).items()
             if abs(x - before.openness.get(i, rests.get(i, 0.0))) > SETTLED
         }
-        now = Moment({**before.moved, **moved}, {**before.openness, **opened}, bodies, before.lamps)
-        self._moments[-1] = now
+        now = {"moved": {**before.moved, **moved}, "openness": {**before.openness, **opened}, "bodies": bodies}
+        self._moments[-1] = dataclasses.replace(before, **now)  # type: ignore[arg-type]
         self._bring_up_to_date(slack=slack)
 
     @functools.cached_property
@@ -225,6 +225,8 @@ class World:
             raise ValueError(f"{self.house.name!r} has nothing called {unknown} that opens; World.openable names all")
         if unknown := sorted(set(moment.bodies) - set(self._bodies)):
             raise ValueError(f"bodies {unknown} are unknown; tell of them by World.add first")
+        if moment.people and self.pictures.quality is None:
+            raise ValueError("people move in lit pictures only; open the world with pictures='fast'")
         if isinstance(self.pictures, Traced):
             raise ValueError("ray-traced pictures show a house at rest: open a world of moment.applied(house)")
         before, self._moments[-1] = self.moment, moment
@@ -296,7 +298,7 @@ class World:
         patches = [(p.page, p.row, p.column, p.picture) for p in drawn.patches]
         if anew:
             overlay = gloss_of(moving.bake, moving=moving) if _reflects(self.pictures) else None
-            renderer.replace(moving.lit, moving.moving, (*self.owners, *self._bodies), overlay)
+            renderer.replace(moving.lit, moving.moving, (*self.owners, *self._bodies, *moving.people), overlay)
         renderer.change(drawn.corners, patches)
 
     def _light_for_moment(self) -> bool:
@@ -341,9 +343,14 @@ class World:
         """Instance id i + 1 belongs to owners[i]."""
         return owners(self.house)
 
-    @functools.cached_property
+    @property
     def classes(self) -> tuple[str, ...]:
         """The class of each instance id: `world.classes[view.ids[y, x]]` is what a pixel shows."""
+        moving = ["person" for _ in self._moving.people] if self._moving is not None else ()
+        return (*self._classes, *("body" for _ in self._bodies), *moving)
+
+    @functools.cached_property
+    def _classes(self) -> tuple[str, ...]:
         return instance_classes(self.house)
 
     @functools.cached_property

@@ -14,8 +14,9 @@ from conftest import two_rooms
 from hand_light import TINY
 from handmade import HandCatalogue, box_mesh, decibels, furnished
 
+from embodied.assets.people import SITTING, STANDING, people
 from embodied.house.house import HouseError, Light, Sky
-from embodied.house.moment import Moment, RigidPose
+from embodied.house.moment import Moment, MovingPerson, RigidPose
 from embodied.interface import Pose
 from embodied.light import bake
 from embodied.light.viewer import ViewerLight
@@ -304,3 +305,30 @@ def test_a_mirror_shows_a_thing_that_moves_before_it(world):
             on_it = view.ids == len(glossy.owners) + 1
             seen.append((view.rgb[on_it][:, 0].astype(int) - view.rgb[on_it][:, 1] > 60).mean())
     assert on_it.mean() > 0.05 and abs(seen[0] - seen[1]) > 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_a_person_is_in_the_picture_in_ids_and_depth_and_shades_the_floor_and_leaves_no_trace(world):
+    somebody = next(iter(people().values()))
+    at = lambda x, pose: Moment(
+        people={"adult_1": MovingPerson(somebody.id, RigidPose.upright((x, 2.4, 0.0), 0.0), pose)}
+    )
+    eye = ((1.5, 3.6, 1.1), -math.pi / 2, -0.5, 1.4, (96, 128))
+    world.show(at(8.5, STANDING))
+    before = world.camera(*eye)
+    seen = {}
+    for name, pose in (("standing", STANDING), ("sitting", SITTING)):
+        world.show(at(1.5, pose))
+        view = seen[name] = world.camera(*eye)
+        person = view.ids == [*world.classes].index("person")
+        assert person.sum() > 200 and abs(float(np.median(view.depth[person])) - 1.2) < 0.5
+    assert (seen["standing"].ids != seen["sitting"].ids).sum() > 300
+    floor = world.owners.index("living_room_1/floor") + 1
+    same = (before.ids == floor) & (seen["standing"].ids == floor)
+    assert np.percentile(seen["standing"].rgb[same].mean(1) - before.rgb[same].mean(1), 1) < -6
+    world.show(at(8.5, STANDING))
+    np.testing.assert_array_equal(world.camera(*eye).rgb, before.rgb)
+    world.show(Moment())
+    with pytest.raises(ValueError, match="no people"):
+        world.show(Moment(people={"a": MovingPerson("nobody", RigidPose((1.0, 1.0, 0.0)), STANDING)}))

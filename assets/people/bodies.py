@@ -106,8 +106,8 @@ def posed(
     """
     if detail not in range(DETAILS_OF_BODIES):
         raise ValueError(f"detail should be 0, 1 or 2, got {detail!r}")
-    mesh = _mesh(person.id, detail)
-    turns = _transforms(person, pose)
+    mesh = mesh_of(person.id, detail)
+    turns = transforms(person, pose)
     blended = (mesh.weights @ turns.reshape(len(turns), 12)).reshape(-1, 3, 4)
     vertices = (blended @ mesh.vertices[:, :, None])[:, :, 0]
     normals = (blended[:, :, :3] @ mesh.normals[:, :, None])[:, :, 0]
@@ -122,8 +122,7 @@ def posed(
 def joint_positions(person: PersonModel, pose: BodyPose) -> dict[str, np.ndarray]:
     """(3,) the place of every joint in a pose, metres, in the frame of `BodyPose`."""
     return {
-        name: m[:, :3] @ person.joints[name] + m[:, 3]
-        for name, m in zip(JOINTS, _transforms(person, pose), strict=True)
+        name: m[:, :3] @ person.joints[name] + m[:, 3] for name, m in zip(JOINTS, transforms(person, pose), strict=True)
     }
 
 
@@ -164,7 +163,7 @@ def _finish(look: _Look, finish: FinishOf | None) -> Finish:
     return Finish((*look.color, 1.0), texture, look.roughness, specular=look.specular)
 
 
-def _transforms(person: PersonModel, pose: BodyPose) -> np.ndarray:
+def transforms(person: PersonModel, pose: BodyPose) -> np.ndarray:
     """(joints, 3, 4) float32 from the body at rest to the posed one."""
     out = np.empty((len(JOINTS), 3, 4), np.float32)
     turn, moved = {}, {}
@@ -195,7 +194,7 @@ def _pack() -> np.lib.npyio.NpzFile:
 
 
 @functools.lru_cache(maxsize=128)
-def _mesh(name: str, detail: int) -> _Mesh:
+def mesh_of(name: str, detail: int) -> _Mesh:
     read = lambda field: _pack()[f"{name}/{field}"]
     vertices, uv = read("vertices").astype(np.float32) * UNIT, read("uv").astype(np.float32) * UV_UNIT
     normals = read("normals").astype(np.float32) / 127

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from embodied.assets.moving_parts import OPEN, TakenApart, closed, openness_of, taken_apart
+from embodied.assets.people import Pose, people
 from embodied.assets.records import MeshPart
 from embodied.geometry import rotation
 from embodied.house.house import HINGED, House, HouseError, Light, Placement
@@ -78,6 +79,17 @@ class RigidPose:
 
 
 @dataclass(frozen=True)
+class MovingPerson:
+    """A person where they are now."""
+
+    person: str
+    """One of assets.people."""
+    place: RigidPose
+    """Of the person's frame: on the ground, the front along -y."""
+    pose: Pose
+
+
+@dataclass(frozen=True)
 class Moment:
     """Poses and openness that are not those of the house at rest.
 
@@ -92,13 +104,15 @@ class Moment:
     """By opening id, or by placement id and part, 'wardrobe_1/left_door': 0 is closed, 1 open, of doors by WIDEST."""
     bodies: Mapping[str, RigidPose] = field(default_factory=dict)
     """By name: things that are no part of the house, such as the links of a robot."""
+    people: Mapping[str, MovingPerson] = field(default_factory=dict)
+    """By name: who moves about; those who only stand or sit are placements of the house."""
     lamps: Mapping[str, bool] = field(default_factory=dict)
     """By light id: on or off."""
 
     @property
     def is_rest(self) -> bool:
         """True where nothing differs."""
-        return not (self.moved or self.openness or self.bodies or self.lamps)
+        return not (self.moved or self.openness or self.bodies or self.people or self.lamps)
 
     def check(self, house: House) -> None:
         """Refuse a moment of another house.
@@ -117,7 +131,10 @@ class Moment:
                 raise ValueError(f"house {house.name!r} has no {kind} {unknown}; it has {sorted(known)[:8]} ...")
         if wrong := {o: x for o, x in self.openness.items() if not 0 <= x <= 1}:
             raise ValueError(f"openness should lie between 0 (closed) and 1 (open), got {wrong}")
-        for name, pose in {**self.moved, **self.bodies}.items():
+        if unknown := sorted({f.person for f in self.people.values()} - set(people())):
+            raise ValueError(f"there are no people {unknown}; embodied.assets.people.people() has {sorted(people())}")
+        places = {name: figure.place for name, figure in self.people.items()}
+        for name, pose in {**self.moved, **self.bodies, **places}.items():
             if not np.isfinite((*pose.position, *pose.quat)).all() or not any(pose.quat):
                 raise ValueError(f"{name!r} needs 3 finite metres and a quaternion w x y z, got {pose}")
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.moving_parts import TakenApart, openness_of
+from embodied.assets.people import people
 from embodied.house.house import House
 from embodied.house.moment import WIDEST, Moment, RigidPose, apart
 from embodied.house.shapes import room_at
@@ -26,6 +27,7 @@ from embodied.light.pages.files import Bake
 from embodied.light.pages.tone import displayed
 from embodied.light.probes import turned
 from embodied.light.settings import LightSettings
+from embodied.light.skins import Skin, person_parts
 from embodied.light.tracing.rays import gloss_data_of
 from embodied.render.gloss import GlossData
 from embodied.scene.cupboards import lit_apart
@@ -36,6 +38,8 @@ from embodied.scene.part import Part
 
 BODY_LUXELS = 0.25
 """Luxels of a body, of those of a piece of furniture: robots have many."""
+PEOPLE_SLACK = 2.0
+"""How much farther than other things people move until their light is computed anew."""
 INSIDE_NAME = "/"
 """End of the name of the inside of a thing that is open; before the name of a part of it stands the same."""
 BEFORE = 0.15
@@ -81,6 +85,9 @@ class MovingHouse:
         self._shown_things: dict[str, np.ndarray] = {}
         self._drawn_at: dict[str, RigidPose] = {}
         self._extra: dict[str, tuple[Part, ...]] = {}
+        self._skins: dict[str, Skin] = {}
+        self._bent: dict[str, list[np.ndarray]] = {}
+        self._lit_bent: dict[str, np.ndarray] = {}
 
     def add(self, name: str, parts: Sequence[Part]) -> None:
         """Tell of a body that is no part of the house, in its own frame; it is drawn where `Moment.bodies` says."""
@@ -110,7 +117,7 @@ class MovingHouse:
             for m in whole.moving:
                 if m.name in openness:
                     out[f"{thing}/{m.name}"] = rest.then(*m.turn(openness[m.name]))
-        return out | dict(moment.bodies)
+        return out | dict(moment.bodies) | {name: figure.place for name, figure in moment.people.items()}
 
     def _apart(self, thing: str) -> TakenApart | None:
         return apart(self.catalogue.mesh, self.house.placement_by_id[thing])
@@ -136,6 +143,7 @@ class MovingHouse:
             self.pages.stand([m for m, _ in self._still])
             for name in new:
                 self._take_out(name)
+        self._bend(moment, slack)
         surfaces = {name: s for name in wanted if (s := self._things[name].surface) is not None}
         dark = {name: Placed(s, wanted[name], wanted[name], np.zeros((0, 3))) for name, s in surfaces.items()}
         rests = {name: thing.rest for name, thing in self._things.items() if thing.rest is not None}
@@ -147,16 +155,35 @@ class MovingHouse:
                 self._placed.pop(name, None)
             elif thing.surface is not None:
                 known = self._placed.get(name)
-                if known is None or shining or known.lit_at.apart(pose) > slack:
+                new_light = known is None or shining or known.surface is not thing.surface
+                is_person = name in self._skins
+                if known is None or new_light or (known.lit_at.apart(pose) > slack and not is_person):
                     unlit[name] = thing.surface, pose
-                elif known.pose != pose:
+                elif known.pose != pose and not is_person:
                     self._placed[name] = dataclasses.replace(known, pose=pose)
         self._placed |= self._lit_at(unlit)
         return SceneChange(self._corners(), (*self._own_patches(), *self.pages.changed(self._groups(), slack)))
 
     # ------------------------------------------------------------------ things
 
+    def _bend(self, moment: Moment, slack: float) -> None:
+        """Bring people into their poses, and their light along where their skin has moved by more than `slack`."""
+        for name, figure in moment.people.items():
+            meshes = self._skins[name].meshes(figure.pose)
+            self._bent[name] = [figure.place.points(v) for v in meshes]
+            at, before = np.concatenate(self._bent[name]), self._lit_bent.get(name)
+            if before is None or np.sqrt(((at - before) ** 2).sum(1).mean()) > PEOPLE_SLACK * slack:
+                self._lit_bent[name] = at
+                surface = self._skins[name].surface(figure.pose, meshes)
+                self._things[name] = dataclasses.replace(self._things[name], surface=surface)
+
     def _thing(self, name: str, moment: Moment) -> _Thing:
+        if name in moment.people:
+            person = moment.people[name].person
+            surface = self._surface([dataclasses.replace(p, owner=name) for p in person_parts(people()[person])])
+            assert surface is not None, "people can be seen"
+            self._skins[name] = Skin(person, surface)
+            return _Thing(surface, None, frozenset())
         if name in self._extra:
             return _Thing(self._surface(self._extra[name]), None, frozenset())
         if "@" in name:
@@ -275,7 +302,8 @@ class MovingHouse:
         groups: dict[str, list[Placed]] = {}
         for name, placed in self._placed.items():
             if not name.endswith(INSIDE_NAME):
-                groups.setdefault(BODIES if self._things[name].rest is None else name, []).append(placed)
+                is_body = self._things[name].rest is None and name not in self._skins
+                groups.setdefault(BODIES if is_body else name, []).append(placed)
         return groups
 
     # ------------------------------------------------------------------ what is drawn
@@ -320,6 +348,11 @@ class MovingHouse:
         return dataclasses.replace(self.lit, meshes=tuple(m for m in meshes if len(m.faces)), pages=tuple(pages))
 
     @property
+    def people(self) -> tuple[str, ...]:
+        """Names of those who have been in the house so far."""
+        return tuple(self._skins)
+
+    @property
     def moving(self) -> range:
         """Numbers in `lit` of the meshes that move."""
         return range(len(self.bake.lit.meshes), len(self.lit.meshes))
@@ -351,7 +384,10 @@ class MovingHouse:
             placed = self._placed.get(name)
             meshes = thing.surface.meshes if thing.surface is not None else ()
             pose = AWAY if placed is None else placed.pose
-            if self._drawn_at.get(name) != pose:
+            if name in self._skins and placed is not None:
+                self._drawn_at.pop(name, None)
+                out |= dict(enumerate(self._bent[name], number))
+            elif self._drawn_at.get(name) != pose:
                 self._drawn_at[name] = pose
                 out |= {number + k: pose.points(m.vertices) for k, m in enumerate(meshes)}
             number += len(meshes)
