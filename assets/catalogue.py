@@ -19,18 +19,21 @@ from types import MappingProxyType
 from tqdm import tqdm
 
 from embodied.assets import materials
-from embodied.assets.built import BASICS, BUILT_ASSETS
+from embodied.assets.built import BASICS
+from embodied.assets.built import BUILT_ASSETS as BUILT_FURNITURE
 from embodied.assets.cache import default_cache, write_bytes
 from embodied.assets.importing.importer import import_model, scaled
 from embodied.assets.importing.own import OwnModel, import_own, read_own, source_digest
 from embodied.assets.importing.sh3f import find_packs, open_pack, pack_of
 from embodied.assets.json_file import RecordError
 from embodied.assets.moving_parts import closed, opened, openness_of
+from embodied.assets.people.figures import FIGURES
 from embodied.assets.records import Asset, Finish, ImportRecipe, MeshPart
 from embodied.assets.rows import DATA, check_classes, read_json, read_models
 
 __all__ = ["Catalogue", "load_catalogue"]
 
+BUILT_ASSETS = {**BUILT_FURNITURE, **FIGURES}
 log = logging.getLogger(__name__)
 GROUPS = "groups.toml"
 """The name of a file of furniture groups in a user's folder."""

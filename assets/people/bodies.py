@@ -18,13 +18,24 @@ from embodied.assets import materials
 from embodied.assets.built.parametric import FinishOf
 from embodied.assets.cache import default_cache
 from embodied.assets.json_file import from_plain, read_json
-from embodied.assets.people.pose import JOINTS, SITTING, BodyPose, Vector
+from embodied.assets.people.pose import JOINTS, POSES, SITTING, BodyPose, Vector
 from embodied.assets.records import Finish, MeshPart
 
 PACK = Path(__file__).with_name("data")
 UNIT, UV_UNIT = 1 / 8192, 1 / 4096
 """Steps of stored coordinates: metres, and texture coordinates."""
 DETAILS_OF_BODIES = 3
+FIGURE_SEAT = 0.45
+"""Height of the seat that sitting figures are made for, metres."""
+STILL = {
+    "standing": "standing",
+    "talking": "standing",
+    "phone": "standing",
+    "reading": "standing",
+    "leaning": "standing",
+    "sitting": "sitting",
+}
+"""Poses that houses are filled with, and what they are."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +76,9 @@ class PersonModel:
     """From the pelvis joint down to what one sits on, metres."""
     joints: Mapping[str, Vector]
     """Places of the joints at rest, metres, in the frame of `BodyPose`."""
+    sizes: Mapping[str, tuple[float, float, float, float]]
+    """By pose in which people stay where they are: width, depth and height, and how far the feet are above the floor,
+    metres."""
     parts: Mapping[str, _Look]
     """Finish by part: skin, eyes, hair, clothes."""
 
@@ -150,6 +164,11 @@ def seated(person: PersonModel, seat: float, pose: BodyPose = SITTING) -> BodyPo
         turns[f"{side}_thigh"] = (-math.pi / 2 + slope - tilt, y, z)
         turns[f"{side}_shin"] = (math.pi / 2 - slope, 0.0, 0.0)
     return dataclasses.replace(pose.with_joints(**turns), lift=lift)
+
+
+def still_pose(person: PersonModel, name: str) -> BodyPose:
+    """A pose of POSES as this person takes it: on the floor, or on a seat of FIGURE_SEAT."""
+    return seated(person, FIGURE_SEAT, POSES[name]) if STILL.get(name) == "sitting" else ground(person, POSES[name])
 
 
 def _plain(key: str) -> Finish:

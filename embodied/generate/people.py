@@ -5,12 +5,17 @@ from __future__ import annotations
 import bisect
 import dataclasses
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
+from embodied.assets.people import Person as PersonModel
+from embodied.assets.people import people as everybody
+from embodied.assets.people.figures import person_of
+from embodied.generate.household import household_of
 from embodied.geometry import rectangle, rotation, yaw_facing
 from embodied.house.house import House, Placement, Room, rounded
 from embodied.house.shapes import footprint
@@ -30,8 +35,12 @@ POLITE = 1.0
 """How far they are where there is room, metres."""
 PERSONAL_SPACE = 0.9
 """Width of the circle around a person that nobody else's body enters, metres."""
-STANDING = 1.35
+STANDING = 0.9
 """Least height of a standing figure, metres."""
+RESIDENT = 4.0
+"""How many times as often one meets somebody who lives in the house as somebody who visits it."""
+GROWN_UP = 18
+"""Age from which somebody of the pack is one of a household's adults, years."""
 ROOM = 0.01
 """Least area of the free spots that a figure may choose from, square metres."""
 SIT = 0.5
@@ -55,9 +64,8 @@ def place_people(house: House, graph: NavGraph, catalogue: Catalogue, *, seed: i
     walker's radius from its edges, and nobody shuts a room. Figures are tried in a drawn order until
     one fits; nodes without room for anybody are left out.
     """
-    figures = catalogue.of_class(CLASS)
-    standing, sitting = [a for a in figures if stands(a)], [a for a in figures if sits(a)]
-    seats = _seats(house, catalogue) if sitting else []
+    figures, chance, used = catalogue.of_class(CLASS), _chances(house, catalogue.of_class(CLASS)), Counter[str]()
+    seats = _seats(house, catalogue) if any(map(sits, figures)) else []
     ways = shapely.MultiLineString([graph.positions[list(e), :2].tolist() for e in graph.edges])
     people: list[Placement] = []
     for node in range(len(graph.positions)):
@@ -67,17 +75,45 @@ def place_people(house: House, graph: NavGraph, catalogue: Catalogue, *, seed: i
             continue
         rng = stream(seed, "person", house.name, node)
         site = _Site(house, room, eye, ways, people)
+        drawn = sorted(figures, key=lambda a: (used[_who(a)], -(rng.random() ** (1 / chance[_who(a)]))))
+        standing, sitting = list(filter(stands, drawn)), list(filter(sits, drawn))
         sit = rng.random() < SIT
-        person = site.sit(sitting, seats, rng) if sit else site.stand(standing, rng)
-        person = person or (site.stand(standing, rng) if sit else site.sit(sitting, seats, rng))
+        person = site.sit(sitting, seats) if sit else site.stand(standing, rng)
+        person = person or (site.stand(standing, rng) if sit else site.sit(sitting, seats))
         if person is not None:
             people.append(dataclasses.replace(person, id=f"{CLASS}_{len(people) + 1}"))
+            used[_who(catalogue.assets[person.asset])] += 1
     people = _passable(house, people)
     met = {
         n: _nearest(people, house.room_by_id[graph.room_of_node[n]], graph.positions[n, :2])
         for n in range(len(graph.positions))
     }
     return {n: p for n, p in met.items() if p is not None}
+
+
+def residents(house: House) -> tuple[PersonModel, ...]:
+    """Those of the pack who live in a house: of one family, grown-ups and children as its household has them."""
+    rng, household = stream(house.seed, "house", "family"), household_of(house)
+    families = sorted({p.family for p in everybody().values()})
+    family = families[int(rng.integers(len(families)))]
+    own = sorted((p for p in everybody().values() if p.family == family), key=lambda p: p.age)
+    adults = [p for p in own if p.age >= GROWN_UP]
+    if not household.children:
+        adults = [adults[i] for i in rng.permutation(len(adults))]
+    apart = lambda p: min((abs(p.age - age) for age in household.children), default=0)
+    children = sorted((p for p in own if p.age < GROWN_UP), key=apart)
+    return (*adults[: household.adults], *children[: len(household.children)])
+
+
+def _who(asset: Asset) -> str:
+    """The person that a figure shows, or its own key where it is no figure of the pack."""
+    return person_of(asset.key).id if asset.pack == "people" else asset.key
+
+
+def _chances(house: House, figures: Sequence[Asset]) -> dict[str, float]:
+    """How often one meets somebody, by person."""
+    here = {p.id for p in residents(house)}
+    return {_who(a): RESIDENT if _who(a) in here else 1.0 for a in figures}
 
 
 def add_people(house: House, met: Mapping[int, Placement], starts: Iterable[int]) -> House:
@@ -142,8 +178,8 @@ class _Site:
         """The first figure that finds free floor beside the ways; it looks at the node."""
         free = self.open.difference(shapely.union_all([*map(footprint, self.things), *self.leaves, *self.others]))
         too_wide = math.inf
-        for i in rng.permutation(len(figures)):
-            asset, body = figures[int(i)], max(figures[int(i)].size[:2]) / 2
+        for asset in figures:
+            body = max(asset.size[:2]) / 2
             if body >= too_wide:
                 continue
             stopped = self.edges.buffer(body + AGENT_RADIUS, quad_segs=4)  # where a walker would be
@@ -159,20 +195,15 @@ class _Site:
         direction = math.atan2(self.eye[1] - spot[1], self.eye[0] - spot[0])
         return self._placed(asset, spot, self.floor, yaw_facing(direction))
 
-    def sit(self, figures: Sequence[Asset], seats: Sequence[_Seat], rng: np.random.Generator) -> Placement | None:
+    def sit(self, figures: Sequence[Asset], seats: Sequence[_Seat]) -> Placement | None:
         """The first figure that finds a seat with nothing on it and nothing where its legs go."""
-        choices = [
-            (seat, figures[int(i)])
-            for seat in seats
-            if seat.room == self.room.id
-            for i in rng.permutation(len(figures))
-        ]
+        choices = [(seat, asset) for seat in seats if seat.room == self.room.id for asset in figures]
         for seat, asset in choices:
             yaw = seat.placement.yaw
             lean = LEAN if seat.deep and asset.size[1] > GROWN else 0.0
             spot = seat.spot + rotation(yaw) @ np.array([0.0, lean - asset.size[1] / 2])
             body = shapely.Polygon(rectangle(spot[0], spot[1], asset.size[0], asset.size[1], yaw))
-            below = self.floor + asset.size[2]
+            below = self.floor + asset.elevation + asset.size[2]
             taken = [
                 *self.leaves,
                 *self.others,
@@ -184,7 +215,7 @@ class _Site:
                 and self.edges.distance(body) >= AGENT_RADIUS
                 and not any(body.intersects(x) for x in taken)
             ):
-                return self._placed(asset, spot, self.floor + seat.lift, yaw)
+                return self._placed(asset, spot, self.floor + seat.lift + asset.elevation, yaw)
         return None
 
     def _placed(self, asset: Asset, spot: Sequence[float], z: float, yaw: float) -> Placement:

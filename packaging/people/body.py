@@ -111,6 +111,7 @@ def _arms_down(
             continue
         end = f"_{label[-1]}"
         wish = {
+            "clavicle": ("upperarm", (1.0 * side, 0.06, -0.28)),
             "upperarm": ("lowerarm", (0.17 * side, 0.03, -1.0)),
             "lowerarm": ("hand", (0.06 * side, -0.16, -1.0)),
             "hand": ("middle_01", (0.0 * side, -0.12, -1.0)),
@@ -130,7 +131,7 @@ def _arms_down(
     return np.einsum("nij,nj->ni", blended, np.column_stack([v, np.ones(len(v))])), spot
 
 
-CURL = 10.0
+CURL = 16.0
 
 
 def _about(axis: np.ndarray, angle: float) -> np.ndarray:

@@ -20,8 +20,10 @@ import numpy as np
 import skin
 from mesh import Layer, clipped, joined_layers
 
-from embodied.assets.people.bodies import PACK, UNIT, UV_UNIT
+from embodied.assets.people import bodies
+from embodied.assets.people.bodies import PACK, STILL, UNIT, UV_UNIT, still_pose
 from embodied.assets.people.pose import JOINTS
+from embodied.assets.records import Finish, bounds
 from embodied.seeds import stream
 
 BUDGETS = {"skin": 8200, "hair": 3600, "beard": 900, "eyes": 500, "glasses": 1400}
@@ -53,7 +55,7 @@ def face_of(row: dict, rng: np.random.Generator) -> dict[str, float]:
             continue
         if "trans" in label and "eyebrow" not in label or "head-angle" in label or "head-age" in label:
             continue
-        value = float(np.clip(rng.normal(0, 0.26), -0.6, 0.6)) * row.get("character", 1.0)
+        value = float(np.clip(rng.normal(0, 0.15), -0.35, 0.35)) * row.get("character", 1.0)
         out[label] = value
         if label.startswith("l-") and (right := "r-" + label[2:]) in labels:
             out[right] = value + float(rng.normal(0, 0.04))
@@ -208,7 +210,16 @@ def main() -> None:
             cv2.imwrite(str(options.out / file), picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         print(name, {d: len(own[f"faces{d}"]) for d in range(len(COARSER))}, len(own["vertices"]))
     np.savez_compressed(options.out / "people.npz", **whole)
-    (options.out / "people.json").write_text(json.dumps(records, indent=1) + "\n")
+    for record in records.values():
+        record["sizes"] = dict.fromkeys(STILL, [1.0, 1.0, 1.0, 0.0])
+    path = options.out / "people.json"
+    path.write_text(json.dumps(records, indent=1) + "\n")
+    bodies.PACK = options.out
+    for name, someone in bodies.people().items():
+        for pose in STILL:
+            low, high = bounds(bodies.posed(someone, still_pose(someone, pose), finish=lambda key: Finish()))
+            records[name]["sizes"][pose] = [round(float(v), 4) for v in (*(high - low), max(low[2], 0.0))]
+    path.write_text(json.dumps(records, indent=1) + "\n")
 
 
 if __name__ == "__main__":

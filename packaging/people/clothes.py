@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from body import layer
 from mesh import Layer, clipped, hemmed, noise, pushed, smoothed, subdivided
+from scipy.spatial import cKDTree
 
 from embodied.assets.people.pose import JOINTS
 
@@ -100,7 +101,7 @@ def neckline(w: Wearer, high: float, depth: float = 0.0, slope: float = 1.6) -> 
 
     def field(x: Layer) -> np.ndarray:
         p = x.place
-        ring = (z0 + high * w.scale + 0.55 * (p[:, 1] - y0)) - p[:, 2]
+        ring = (z0 + high * w.scale + 0.75 * (p[:, 1] - y0)) - p[:, 2]
         vee = z0 - depth + slope * np.abs(p[:, 0] - x0) - p[:, 2]
         return np.minimum(ring, np.where(p[:, 1] < y0 + 0.01, vee, 1.0)) if depth else ring
 
@@ -120,6 +121,17 @@ def open_front(w: Wearer, gap: float, flare: float = 0.0) -> Field:
 
 def meet(*fields: Field) -> Field:
     return lambda x: np.minimum.reduce([f(x) for f in fields])
+
+
+def rounded(one: Field, other: Field, radius: float = 0.06) -> Field:
+    """Inside both, their corner rounded off."""
+
+    def field(x: Layer) -> np.ndarray:
+        a, b = one(x), other(x)
+        near = np.clip(radius - np.stack([a, b]), 0, None)
+        return np.where(near.min(0) > 0, radius - np.hypot(*near), np.minimum(a, b))
+
+    return field
 
 
 Shell = tuple[np.ndarray, np.ndarray]
@@ -176,18 +188,21 @@ def garment(
     if arms:
         x = _loose(w, x, ARM, arm_share(x), arms)
     x = smoothed(x, 3)
-    s_leg, _, _ = along(w, x, *LEG)
     stretch = x.place * [1, 1, 2.2]
     wave = noise(stretch, 0.13 * w.scale, w.rng) + 0.6 * noise(stretch, 0.06 * w.scale, w.rng)
-    x = x.moved(x.place + x.normals() * (folds * wave + ease)[:, None])
-    x = pushed(x, shell, gap)
+    calm = np.clip(edge(x) / 0.05, 0.15, 1)
+    x = x.moved(x.place + x.normals() * (folds * calm * wave + ease)[:, None])
+    x = pushed(smoothed(pushed(x, shell, gap), 4), shell, 0.5 * gap)
     x = clipped(smoothed(x, 1, 0.3), edge(x))
     return hemmed(x, cloth)
 
 
 def grown(shell: Shell, x: Layer) -> Shell:
-    """The shell with what is worn over it."""
-    return np.vstack([shell[0], x.place]), np.vstack([shell[1], x.normals()])
+    """The shell with what is worn over it, but for the insides of hems."""
+    normals = x.normals()
+    near = cKDTree(shell[0]).query(x.place)[1]
+    outside = np.einsum("ni,ni->n", normals, shell[1][near]) > 0.4
+    return np.vstack([shell[0], x.place[outside]]), np.vstack([shell[1], normals[outside]])
 
 
 @dataclass(frozen=True)
@@ -236,7 +251,7 @@ def shirt(
     width: float = 1.0,
 ) -> Made:
     edge = meet(above(_waist(w, length)), sleeve(w, sleeves), neckline(w, neck, vee))
-    wide = [(0.25, 0.066), (0.62, 0.062), (1.0, 0.052), (1.9, 0.043)]
+    wide = [(0.25, 0.057), (0.62, 0.061), (1.0, 0.047), (1.9, 0.039)]
     x = garment(
         w, tights(w), edge, shell, gap=0.006, soft=14, arms=[(s, r * width) for s, r in wide], folds=0.0022, ease=0.003
     )
@@ -253,7 +268,7 @@ def jumper(
     width: float = 1.1,
 ) -> Made:
     edge = meet(above(_waist(w, length)), sleeve(w, sleeves), neckline(w, neck, vee))
-    wide = [(0.25, 0.072), (1.0, 0.058), (1.7, 0.05), (1.93, 0.04)]
+    wide = [(0.25, 0.059), (1.0, 0.049), (1.7, 0.042), (1.93, 0.034)]
     x = garment(
         w,
         tights(w),
@@ -278,8 +293,10 @@ def cardigan(
     vee: float = 0.0,
     width: float = 1.15,
 ) -> Made:
-    edge = meet(above(_waist(w, length)), sleeve(w, sleeves), neckline(w, neck), open_front(w, 0.09 * w.scale, 0.14))
-    wide = [(0.25, 0.076), (1.0, 0.062), (1.9, 0.05)]
+    edge = meet(
+        above(_waist(w, length)), sleeve(w, sleeves), rounded(neckline(w, neck), open_front(w, 0.09 * w.scale, 0.14))
+    )
+    wide = [(0.25, 0.061), (1.0, 0.052), (1.9, 0.042)]
     x = garment(
         w,
         tights(w),
@@ -364,7 +381,9 @@ SOLE = 0.024
 def shoes(w: Wearer, shell: Shell, length: float = 1.97) -> Made:
     """Shoes from the feet; up to so far along the leg from below."""
     edge = lambda y: np.minimum(-leg(w, length)(y), share(y, "shin", "foot", "toes") - 0.5)
-    x = garment(w, tights(w), edge, shell, gap=0.006, soft=16, folds=0.0, cloth=0.005, ease=0.002)
+    x = tights(w)
+    x = smoothed(pushed(clipped(x, edge(x) + 0.03), shell, 0.002), 30)
+    x = hemmed(clipped(x.moved(x.place + 0.008 * x.normals()), edge(x)), 0.005)
     foot = x.place.copy()
     low = foot[:, 2] < 0.03 * w.scale
     drop = np.clip(1 - foot[:, 2] / (0.03 * w.scale), 0, 1)

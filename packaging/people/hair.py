@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from body import layer
 from clothes import ORDER, Wearer
-from mesh import Layer, clipped, hemmed, noise, smoothed, subdivided
+from mesh import Layer, clipped, hemmed, joined_layers, noise, smoothed, subdivided
 
 from embodied.assets.built.primitives import Shape, joined, tube
 
-AROUND, DOWN = 84, 30
+AROUND, DOWN = 96, 34
+THETA = np.linspace(2, 128, DOWN)
+"""Angles of the rows from above, degrees."""
 HAIRLINE = np.array(
     [
         [0, 8.02],
@@ -71,13 +73,11 @@ def hairline(template: np.ndarray, cut: Cut) -> np.ndarray:
     return inside
 
 
-def _cast(x: Layer, origin: np.ndarray, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Distance along each ray (m, 3) to the layer, template place and normal there; the farthest hit."""
+def _cast(x: Layer, origin: np.ndarray, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distance along each ray (m, 3) to the layer, 0 where it misses, and the template's place there; the farthest hit."""
     a, b, c = (x.place[x.faces[:, k]] for k in range(3))
-    far, hit = np.zeros(len(rays)), np.zeros(len(rays), int)
-    e, f = b - a, c - a
-    t0 = origin - a
-    q = np.cross(t0, e)
+    e, f, t0 = b - a, c - a, origin - a
+    q, far, place = np.cross(t0, e), np.zeros(len(rays)), np.zeros((len(rays), 3))
     for i, d in enumerate(rays):
         p = np.cross(d, f)
         det = np.einsum("ni,ni->n", e, p)
@@ -85,9 +85,10 @@ def _cast(x: Layer, origin: np.ndarray, rays: np.ndarray) -> tuple[np.ndarray, n
         u, v, t = np.einsum("ni,ni->n", t0, p) / det, (q @ d) / det, np.einsum("ni,ni->n", f, q) / det
         good = (u >= -1e-4) & (v >= -1e-4) & (u + v <= 1.0001) & (t > 0)
         if good.any():
-            hit[i] = np.where(good, t, -1).argmax()
-            far[i] = t[hit[i]]
-    return far, x.template[x.faces[hit]].mean(1), x.normals()[x.faces[hit]].mean(1)
+            k = np.where(good, t, -1).argmax()
+            far[i] = t[k]
+            place[i] = np.array([1 - u[k] - v[k], u[k], v[k]]) @ x.template[x.faces[k]]
+    return far, place
 
 
 def hair(w: Wearer, cut: Cut) -> list[Layer]:
@@ -104,14 +105,14 @@ def hair(w: Wearer, cut: Cut) -> list[Layer]:
     top = head.place[:, 2].max()
     origin = np.array([0.0, np.mean([head.place[:, 1].min(), head.place[:, 1].max()]) + 0.012 * k, top - 0.095 * k])
     phi = np.linspace(0, 2 * np.pi, AROUND + 1)[:-1]  # 0 is the front, then to the left
-    theta = np.radians(np.linspace(2, 128, DOWN))
+    theta = np.radians(THETA)
     ray = np.stack(
         np.broadcast_arrays(
             np.sin(theta)[:, None] * np.sin(phi), -np.sin(theta)[:, None] * np.cos(phi), np.cos(theta)[:, None]
         ),
         -1,
     )
-    far, place, _ = _cast(head, origin, ray.reshape(-1, 3))
+    far, place = _cast(head, origin, ray.reshape(-1, 3))
     far, place = far.reshape(DOWN, AROUND), place.reshape(DOWN, AROUND, 3)
     inside = hairline(place.reshape(-1, 3), cut).reshape(DOWN, AROUND)
     inside[far < 0.02 * k] = -1
@@ -129,15 +130,16 @@ def hair(w: Wearer, cut: Cut) -> list[Layer]:
         relief -= (0.008 * np.exp(-((line / (0.006 * k)) ** 2)) - 0.006 * np.exp(-((line / (0.03 * k)) ** 2))) * (
             skin[..., 1] < origin[1] + 0.05
         )
-    reach = np.clip(inside / 0.28, 0, 1) ** 0.7
+    wide = 0.28 if cut.fall else 0.45
+    reach = np.clip(inside / wide, 0, 1) ** 0.75
     out = np.where(
         inside > 0, (thick * k + relief) * reach - 0.002 * (1 - reach), -0.004 - 0.02 * np.clip(-inside, 0, 1)
     )
     shell = origin + ray * (far + out)[..., None]
     made = [_grid(w, shell, place)]
-    made = [clipped(x, hairline(x.template, cut) + 0.12) for x in made]
+    made = [clipped(x, hairline(x.template, cut) + 0.1) for x in made]
     if cut.fall or cut.fringe:
-        made.append(_curtain(w, cut, origin, ray, far, thick, around, phi, theta))
+        made.append(_curtain(w, cut, origin, shell, inside, around, phi))
     if cut.bun:
         made.append(_ball(w, origin + np.array([0.0, 0.105 * k, 0.03 * k]), cut.bun, rng))
     if cut.tail:
@@ -160,49 +162,59 @@ def _curls(points: np.ndarray, k: float, rng: np.random.Generator) -> np.ndarray
 
 
 def _curtain(
-    w: Wearer,
-    cut: Cut,
-    origin: np.ndarray,
-    ray: np.ndarray,
-    far: np.ndarray,
-    thick: np.ndarray,
-    around: np.ndarray,
-    phi: np.ndarray,
-    theta: np.ndarray,
+    w: Wearer, cut: Cut, origin: np.ndarray, shell: np.ndarray, inside: np.ndarray, around: np.ndarray, phi: np.ndarray
 ) -> Layer:
-    """Hair that hangs from the widest ring of the head: at the back and sides `fall`, over the forehead `fringe`."""
+    """Hair that hangs from the hairline: at the sides and the back `fall` below the ears, over the forehead `fringe`."""
     k = w.height_of_head
-    row = int(np.abs(theta - np.radians(72)).argmin())
-    rows = 16
-    start = origin + ray[row] * (far[row] + thick[row] * k)[:, None]
-    front = np.interp(around[0], [30, 46, 60], [0, 1, 1])
-    ear_low = origin[2] - 0.07 * k
-    long = np.where(around[0] > 44, start[:, 2] - (ear_low - cut.fall), 0.0)
-    short = np.where(around[0] < 44, cut.fringe, 0.0)
-    length = np.maximum(long, short)
-    ragged = 1 + 0.04 * noise(np.column_stack([np.cos(phi), np.sin(phi), 0 * phi]) * 9, 0.8, w.rng)
-    t = np.linspace(0, 1, rows)[:, None]
-    strands = 0.6 * noise(np.column_stack([np.cos(phi) * 12, np.sin(phi) * 12, 0 * phi]), 0.9, np.random.default_rng(7))
-    below = t * (length * ragged)[None]
-    bulge = 0.004 * np.sin(np.pi * np.minimum(below / 0.12, 1)) + cut.wave * strands[None] * np.minimum(below / 0.03, 1)
-    inward = -0.10 * np.maximum(below - 0.07 * k, 0) * (front[None])
-    side = start - origin
-    side[:, 2] = 0
-    unit = side / np.linalg.norm(side, axis=1, keepdims=True)
-    grid = start[None] + unit[None] * (bulge + inward + 0.001)[..., None] + np.stack([0 * below, 0 * below, -below], -1)
-    neck = w.joints["neck"]
-    back = around[0] > 100
-    grid[:, back, 1] = np.maximum(
-        grid[:, back, 1], neck[1] + 0.055 * k + 0.35 * np.maximum(neck[2] - grid[:, back, 2], 0)
+    rows, columns = 22, np.arange(AROUND)
+    last = np.where(inside > 0.03, np.arange(len(shell))[:, None], 0)
+    last[(76 if cut.fall else 128) < THETA] = 0
+    start = shell[last.max(0), columns]
+    low = origin[2] - 0.075 * k - cut.fall
+    ragged = 1 + 0.035 * noise(np.column_stack([np.cos(phi), np.sin(phi), 0 * phi]) * 9, 0.8, w.rng)
+    sides = np.interp(around[0], [44, 52, 75], [0, 0.8, 1.0]) * (cut.fall > 0)
+    length = (
+        np.where(
+            around[0] > 44, (start[:, 2] - low) * sides, np.interp(around[0], [0, 34, 46], [1, 1.05, 0.0]) * cut.fringe
+        )
+        * ragged
     )
+    t = np.linspace(0, 1, rows)[:, None]
+    down = t * length
+    flat = (start - origin) * [1, 1, 0]
+    radius = np.linalg.norm(flat, axis=1)
+    unit = flat / radius[:, None]
+    ear = 0.092 * k * np.exp(-(((around[0] - 88) / 26) ** 2))
+    wide = np.maximum(
+        radius + 0.004,
+        np.where(
+            around[0] > 44,
+            np.maximum(ear, np.interp(around[0], [50, 70, 110, 180], [0.095, 0.088, 0.09, 0.105]) * k),
+            0,
+        ),
+    )
+    locks = noise(np.column_stack([np.cos(phi) * 14, np.sin(phi) * 14, 0 * phi]), 0.9, np.random.default_rng(7))
+    reach = radius + (wide - radius) * np.clip(down / (0.05 * k), 0, 1) ** 0.8
+    reach -= 0.16 * np.maximum(down - 0.13 * k, 0) * (around[0] > 60)
+    reach += cut.wave * 0.8 * locks * np.clip(down / 0.04, 0, 1) + 0.35 * cut.curl * np.sin(
+        down / (0.028 * k) + 3 * np.sin(2 * phi)
+    ) * np.clip(down / 0.05, 0, 1)
+    grid = origin + unit[None] * reach[..., None]
+    grid[..., 2] = start[:, 2] - down
+    neck, chest = w.joints["neck"], w.joints["chest"]
+    behind = neck[1] + 0.07 * k + 0.25 * np.clip(neck[2] - grid[..., 2], 0, 0.2)
+    back = np.clip((around - 95) / 30, 0, 1)
+    under = np.clip((neck[2] + 0.05 - grid[..., 2]) / 0.06, 0, 1) * back
+    grid[..., 1] = grid[..., 1] * (1 - under) + np.maximum(grid[..., 1], behind) * under
+    fore = np.clip((neck[2] - 0.02 - grid[..., 2]) / 0.08, 0, 1) * (around < 95)
+    grid[..., 1] = grid[..., 1] * (1 - fore) + np.minimum(grid[..., 1], chest[1] - 0.105 * w.scale) * fore
     x = _grid(w, grid, np.broadcast_to(np.array([0, 8.0, 0.0]), grid.shape))
-    keep = np.tile(length > 0.004, rows)
-    # weights: what hangs below the neck goes with the chest
-    low = np.clip((w.joints["neck"][2] + 0.03 - x.place[:, 2]) / 0.1, 0, 0.75)
-    x.data[:, 8 + ORDER.index("head")] = 1 - low
-    x.data[:, 8 + ORDER.index("chest")] = low
-    x = x.compact(x.faces[keep[x.faces].all(1)]) if len(keep) == len(x.data) else x
-    return hemmed(x, 0.006)
+    hang = np.clip((neck[2] + 0.04 - x.place[:, 2]) / 0.12, 0, 0.8)  # what lies on the shoulders goes with the chest
+    x.data[:, 8 + ORDER.index("head")], x.data[:, 8 + ORDER.index("chest")] = 1 - hang, hang
+    keep = np.tile(np.append(length, length[0]) > 0.006, rows)
+    x = x.compact(x.faces[keep[x.faces].all(1)])
+    inner = x.moved(x.place - 0.007 * x.normals())
+    return joined_layers([hemmed(x, 0.007), Layer(inner.data, inner.faces[:, ::-1], inner.weld)])
 
 
 def _grid(w: Wearer, points: np.ndarray, template: np.ndarray) -> Layer:
@@ -210,8 +222,8 @@ def _grid(w: Wearer, points: np.ndarray, template: np.ndarray) -> Layer:
     rows, columns = points.shape[:2]
     ring = lambda g: np.concatenate([g, g[:, :1]], axis=1)
     p, t = ring(points).reshape(-1, 3), ring(template).reshape(-1, 3)
-    v = np.repeat(np.linspace(0, 0.014 * rows, rows), columns + 1)
-    u = np.tile(np.linspace(0, 0.6, columns + 1), rows)
+    v = np.repeat(np.linspace(0, 0.05 * rows, rows), columns + 1)
+    u = np.tile(np.linspace(0, 4.0, columns + 1), rows)
     weights = np.zeros((len(p), len(ORDER)))
     weights[:, ORDER.index("head")] = 1
     i = (np.arange(rows - 1)[:, None] * (columns + 1) + np.arange(columns)).ravel()
@@ -248,12 +260,12 @@ def beard(w: Wearer, long: float) -> Layer:
     x = x.compact(x.faces[(x.weights[x.faces][:, :, ORDER.index("head")] > 0.2).all(1)])
     x = subdivided(clipped(x, beard_field(x.template) + 0.1))
     f = beard_field(x.template)
-    reach = np.clip(f / 0.22, 0, 1)
+    reach = np.clip(f / 0.12, 0, 1) ** 0.5
     low = np.clip((6.75 - x.template[:, 1]) / 0.4, 0.25, 1)
-    thick = long * reach * low * (1 + 0.25 * noise(x.place, 0.012, w.rng)) - 0.0008 * (1 - reach)
+    thick = long * reach * low * (1 + 0.2 * noise(x.place, 0.012, w.rng)) + 0.0012 * reach - 0.0006
     x = smoothed(x, 3)
     x = clipped(x.moved(x.place + x.normals() * thick[:, None]), f)
-    x.data[:, 6:8] = np.column_stack([np.arctan2(x.template[:, 0], x.template[:, 2]) * 0.1, x.template[:, 1] * 0.1])
+    x.data[:, 6:8] = np.column_stack([np.arctan2(x.template[:, 0], x.template[:, 2]), x.template[:, 1] * 0.5])
     return x
 
 
@@ -261,7 +273,7 @@ def beard_field(template: np.ndarray) -> np.ndarray:
     """(n,) decimetres inside a beard, at places of the template."""
     x, up, front = template.T
     x = np.abs(x)
-    edge = 6.72 + 0.62 * np.clip((x - 0.22) / 0.42, 0, 1) ** 1.6
+    edge = 6.52 + 0.75 * np.clip((x - 0.3) / 0.4, 0, 1) ** 2
     inside = np.minimum.reduce([edge - up, up - 6.05, 0.72 - x, front - 0.1])
     lip = 0.16 - np.hypot(x / 1.75, (up - 6.66) * 1.1)  # around the mouth
     upper = np.minimum.reduce([0.30 - x, up - 6.70, 6.86 - up, front - 1.2]) * 1.2

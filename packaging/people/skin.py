@@ -77,6 +77,13 @@ def _lashes() -> np.ndarray:
     return np.minimum(np.stack(out), 1.0)
 
 
+@functools.cache
+def _grain(size: float, seed: int) -> np.ndarray:
+    """(SIDE, SIDE) noise of a grain, decimetres."""
+    places = _map()[0].reshape(-1, 3)
+    return noise(places, size, np.random.default_rng(seed), 12).reshape(SIDE, SIDE).astype(np.float32)
+
+
 def hollows(place: np.ndarray) -> np.ndarray:
     """(n,) how hollow the body is at vertices of the template, about -1 to 1, at two sizes."""
     x = layer("body", place)
@@ -102,9 +109,7 @@ def paint(place: np.ndarray, row: dict, cut: Cut, hair_color: np.ndarray, rng: n
     """(SIDE, SIDE, 3) uint8 RGB."""
     places, owner, *_ = _map()
     x, up, front = places[..., 0], places[..., 1], places[..., 2]
-    flat = places.reshape(-1, 3)
-    grain = lambda size, seed: noise(flat, size, np.random.default_rng(seed)).reshape(SIDE, SIDE).astype(np.float32)
-    seed = int(rng.integers(1000))
+    flat, seed, grain = places.reshape(-1, 3), int(rng.integers(3)), _grain
     age, tone = row["age"], np.array(TONES[row["skin"]], float) * (1 + 0.05 * (row.get("shade", 0.0)))
     rgb = np.ones((SIDE, SIDE, 3)) * tone
     # blood below the skin: cheeks, nose, ears, chin, hands
@@ -155,15 +160,15 @@ def paint(place: np.ndarray, row: dict, cut: Cut, hair_color: np.ndarray, rng: n
     # brows
     rgb = _over(rgb, hair_color * 0.72 + 6, _brows(x, up, front, row, seed))
     # stubble and the roots of hair
-    stubble = float(row.get("stubble", 0.0))
+    stubble = float(row.get("stubble", 0.8 * bool(row.get("beard"))))
     if stubble:
         field = np.clip(beard_field(flat).reshape(SIDE, SIDE) / 0.18, 0, 1) * (front > 0.2)
         dots = 0.75 + 0.35 * np.clip(grain(0.018, seed + 7), -1, 1)
         rgb = _over(rgb, hair_color * 0.45 + 0.35 * tone * [0.75, 0.8, 0.9], np.clip(stubble * field * dots, 0, 0.9))
     roots = hairline(flat, cut).reshape(SIDE, SIDE)
-    jag = 0.06 * grain(0.05, seed + 8) + 0.05 * grain(0.15, seed + 9)
+    jag = 0.012 * grain(0.04, seed + 8) + 0.02 * grain(0.15, seed + 9)
     scalp = (
-        np.clip((roots + jag + 0.05) / 0.2, 0, 1)
+        np.clip((roots + jag + 0.08) / 0.26, 0, 1)
         * (up > 6.5)
         * (1 - _mask("ears"))
         * (front < 1.6)
@@ -192,14 +197,14 @@ def _over(rgb: np.ndarray, color: np.ndarray, share: np.ndarray) -> np.ndarray:
 def _brows(x: np.ndarray, up: np.ndarray, front: np.ndarray, row: dict, seed: int) -> np.ndarray:
     """(SIDE, SIDE) how much of a brow's hair there is."""
     side = np.abs(x)
-    thick = (0.075 if row["sex"] == "male" else 0.05) * (0.75 if row["age"] < 12 else 1.0) * row.get("brows", 1.0)
-    middle = np.interp(side, [0.1, 0.2, 0.36, 0.5, 0.6], [7.52, 7.555, 7.605, 7.575, 7.49])
+    thick = (0.056 if row["sex"] == "male" else 0.04) * (0.6 if row["age"] < 12 else 1.0) * row.get("brows", 1.0)
+    middle = np.interp(side, [0.1, 0.2, 0.36, 0.5, 0.6], [7.47, 7.50, 7.545, 7.52, 7.45])
     width = thick * np.interp(side, [0.08, 0.13, 0.3, 0.5, 0.62], [0.0, 1.0, 1.0, 0.55, 0.0])
     gap = np.abs(up - middle) / np.maximum(width, 1e-4)
     points = np.stack([(x * 1.0 + np.sign(x) * 0.6 * (up - 7.5)) * 3.0, up * 0.9, 0 * x], -1).reshape(-1, 3)
-    hairs = noise(points, 0.06, np.random.default_rng(seed)).reshape(x.shape)
+    hairs = noise(points, 0.06, np.random.default_rng(seed), 12).reshape(x.shape)
     share = np.clip(1.25 - gap**2, 0, 1) * (width > 0) * (front > 0.8)
-    return np.clip(share * (0.72 + 0.3 * hairs), 0, 0.93)
+    return np.clip(share * (0.66 + 0.3 * hairs), 0, 0.9) * (0.7 if row["age"] < 12 else 1.0)
 
 
 def eye_picture(color: tuple[int, int, int], side: int = 128) -> np.ndarray:
@@ -226,7 +231,6 @@ def eye_picture(color: tuple[int, int, int], side: int = 128) -> np.ndarray:
 
 def hair_picture(color: np.ndarray, grey: float, rng: np.random.Generator, side: int = 256) -> np.ndarray:
     """(side, side, 3) uint8 RGB: strands along v."""
-    u = np.arange(side)
     strands = sum(rng.normal(size=(side,)) for _ in range(1))
     rows = np.stack([np.roll(strands, int(3 * np.sin(2 * np.pi * i / side))) for i in range(side)])
     rows = 0.6 * rows + 0.5 * cv2.GaussianBlur(np.tile(rng.normal(size=(1, side)), (side, 1)), (0, 0), 3) * 3
@@ -234,9 +238,12 @@ def hair_picture(color: np.ndarray, grey: float, rng: np.random.Generator, side:
     shade = np.clip(1 + 0.17 * rows + 0.12 * fine, 0.35, 1.9)
     rgb = np.array(color, float) * shade[..., None]
     if grey:
-        white = (cv2.GaussianBlur(rng.normal(size=(side, side)), (0, 0), sigmaX=0.6, sigmaY=20) * 6 > 1.2 - 2.2 * grey)[
-            ..., None
-        ]
-        rgb = np.where(white, np.array([196, 192, 186]) * shade[..., None], rgb)
-    del u
+        white = np.clip(
+            0.5
+            + cv2.GaussianBlur(rng.normal(size=(side, side)), (0, 0), sigmaX=0.6, sigmaY=20) * 4
+            + 1.6 * (grey - 0.5),
+            0,
+            1,
+        )
+        rgb = _over(rgb, np.array([176, 172, 166]) * shade[..., None], 0.9 * white)
     return np.clip(rgb, 0, 255).astype(np.uint8)
