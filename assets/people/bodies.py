@@ -51,7 +51,7 @@ class _Look:
     specular: float = 0.3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PersonModel:
     """Somebody of the pack."""
 

@@ -18,7 +18,7 @@ from embodied.world import open_world
 
 PEOPLE_HOUSES, PEOPLE_AREA = 6, (44.0, 60.0)
 """Houses, and their square metres."""
-CROP, CROP_ANGLE = (400, 300), math.radians(56)
+CROP, CROP_ANGLE = (400, 300), math.radians(66)
 """Height and width of a picture, pixels, and its vertical field of view."""
 ROW = 6
 
@@ -39,14 +39,13 @@ def people_pictures(
             for person in (p for p in house.placements if p.object_class == "person"):
                 node = next(n for n in met if met[n].position == person.position)
                 eye = graph.positions[node]
-                x, y, z = np.array([*person.position[:2], person.position[2] + 0.55 * person.size[2]]) - eye
-                rgb = world.renderer.view(
-                    eye, math.atan2(y, x), math.atan2(z, math.hypot(x, y)), CROP_ANGLE, (CROP[0], CROP[1])
-                ).rgb
+                x, y, z = np.array([*person.position[:2], person.position[2] + 0.72 * person.size[2]]) - eye
+                yaw, pitch = math.atan2(y, x), math.atan2(z, math.hypot(x, y))
+                rgb = world.renderer.view(eye, yaw, pitch, CROP_ANGLE, CROP).rgb
                 cv2.imwrite(str(folder / f"{k}_{person.id}.png"), rgb[..., ::-1])
                 crops.append(rgb)
         progress(f"house {k + 1} of {PEOPLE_HOUSES}: {len(crops)} people so far")
     crops += [np.zeros_like(crops[0])] * (-len(crops) % ROW)
     sheet = np.vstack([np.hstack(crops[i : i + ROW]) for i in range(0, len(crops), ROW)])
     cv2.imwrite(str(out / "people.png"), sheet[..., ::-1])
-    return {"sheet": str(out / "people.png"), "people": len(crops)}
+    return {"sheet": str(out / "people.png"), "people": len(list(folder.glob("*.png")))}

@@ -6,6 +6,7 @@
   bakes                     light a flat repeatedly
   light                     compare the ways of rendering with a path tracer
   moving                    compare what moves with a path tracer, and what a frame costs then; takes an hour, in pieces
+  people                    draw everybody whom one meets in six lit houses; takes half an hour
 
 Close other programs first.
 """
@@ -21,7 +22,7 @@ from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.options import Option, OutputFolder, drawn_as
 from embodied.render.pictures import DRAWN
 
-PARTS = ("houses", "pictures", "views", "plays", "seen", "drive", "bakes", "light", "moving")
+PARTS = ("houses", "pictures", "views", "plays", "seen", "drive", "bakes", "light", "moving", "people")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +34,7 @@ class BenchOptions(Furnished, Printed):
     pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
     """How pictures, seen and drive draw the house."""
     out: OutputFolder = Path("out/bench")
-    """Folder for the files of light and moving."""
+    """Folder for the files of light, moving and people."""
 
 
 def run(args: BenchOptions) -> None:
@@ -71,4 +72,9 @@ def run(args: BenchOptions) -> None:
 
         facts["moving"] = moving.compare(catalogue, args.cache, args.out, seed=args.seed, progress=note)
         texts.append(moving.table(facts["moving"]))
+    if "people" in parts:
+        from embodied.bench.people import people_pictures  # late: loads the generator and MuJoCo
+
+        facts["people"] = people_pictures(catalogue, args.cache, args.out, seed=args.seed, progress=note)
+        texts.append(f"{facts['people']['people']} people: {facts['people']['sheet']}")
     show(args, facts, "\n\n".join(texts))

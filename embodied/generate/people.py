@@ -75,7 +75,8 @@ def place_people(house: House, graph: NavGraph, catalogue: Catalogue, *, seed: i
             continue
         rng = stream(seed, "person", house.name, node)
         site = _Site(house, room, eye, ways, people)
-        drawn = sorted(figures, key=lambda a: (used[_who(a)], -(rng.random() ** (1 / chance[_who(a)]))))
+        who = stream(seed, "person", house.name, node, "who")
+        drawn = sorted(figures, key=lambda a: (used[_who(a)], -(who.random() ** (1 / chance[_who(a)]))))
         standing, sitting = list(filter(stands, drawn)), list(filter(sits, drawn))
         sit = rng.random() < SIT
         person = site.sit(sitting, seats) if sit else site.stand(standing, rng)

@@ -124,14 +124,28 @@ def _arms_down(
         elif label[:-2] == "foot":
             turn[label] = np.eye(3)
         elif label[:-3] in [f + "_0" for f in FINGERS]:
+            number = int(label[-3])
+            if number == 1:  # together
+                own = turn[above] @ (bones[f"{label[:-5]}_02{end}"] - bones[label])
+                middle = turn[above] @ (bones[f"middle_02{end}"] - bones[f"middle_01{end}"])
+                own, middle = own / np.linalg.norm(own), middle / np.linalg.norm(middle)
+                turn[label] = _align(own, 0.25 * own + 0.75 * middle) @ turn[above]
             across = turn[above] @ (bones[f"pinky_01{end}"] - bones[f"index_01{end}"])
-            turn[label] = _about(across / np.linalg.norm(across), np.radians(CURL) * -side) @ turn[above]
+            curl = CURL[number - 1] * -side
+            turn[label] = _about(across / np.linalg.norm(across), np.radians(curl)) @ turn[label]
+        elif label[:-2] == "thumb_01":
+            along = turn[above] @ (bones[f"middle_01{end}"] - bones[f"hand{end}"])
+            own = turn[above] @ (bones[f"thumb_03{end}"] - bones[label])
+            turn[label] = (
+                _align(own, 0.55 * own / np.linalg.norm(own) + 0.45 * along / np.linalg.norm(along)) @ turn[above]
+            )
     moves = np.stack([np.column_stack([turn[x], spot[x] - turn[x] @ bones[x]]) for x in labels])
     blended = np.einsum("nb,bij->nij", dense, moves)
     return np.einsum("nij,nj->ni", blended, np.column_stack([v, np.ones(len(v))])), spot
 
 
-CURL = 16.0
+CURL = (16.0, 24.0, 14.0)
+"""How far fingers are bent at their three joints, degrees."""
 
 
 def _about(axis: np.ndarray, angle: float) -> np.ndarray:

@@ -130,8 +130,8 @@ def hair(w: Wearer, cut: Cut) -> list[Layer]:
         relief -= (0.008 * np.exp(-((line / (0.006 * k)) ** 2)) - 0.006 * np.exp(-((line / (0.03 * k)) ** 2))) * (
             skin[..., 1] < origin[1] + 0.05
         )
-    wide = 0.28 if cut.fall else 0.45
-    reach = np.clip(inside / wide, 0, 1) ** 0.75
+    wide = 0.28 if cut.fall else float(np.clip(18 * cut.sides, 0.35, 0.7))
+    reach = np.clip(inside / wide, 0, 1) ** 0.85
     out = np.where(
         inside > 0, (thick * k + relief) * reach - 0.002 * (1 - reach), -0.004 - 0.02 * np.clip(-inside, 0, 1)
     )
@@ -274,9 +274,10 @@ def beard_field(template: np.ndarray) -> np.ndarray:
     x, up, front = template.T
     x = np.abs(x)
     edge = 6.52 + 0.75 * np.clip((x - 0.3) / 0.4, 0, 1) ** 2
+    edge = np.maximum(edge, 6.76 - 12 * (x - 0.37) ** 2)
     inside = np.minimum.reduce([edge - up, up - 6.05, 0.72 - x, front - 0.1])
     lip = 0.16 - np.hypot(x / 1.75, (up - 6.66) * 1.1)  # around the mouth
-    upper = np.minimum.reduce([0.30 - x, up - 6.70, 6.86 - up, front - 1.2]) * 1.2
+    upper = np.minimum.reduce([0.07 - np.abs(up - 6.81 + 0.9 * x**2), (0.44 - x) * 0.6, front - 1.0])
     return np.maximum(np.minimum(inside, -lip), upper)
 
 

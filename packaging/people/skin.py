@@ -13,9 +13,9 @@ from mesh import noise
 from scipy.spatial import cKDTree
 
 SIDE = 1024
-TONES = {"light": (226, 178, 152), "tan": (205, 152, 118), "brown": (158, 106, 76), "dark": (98, 63, 46)}
+TONES = {"light": (226, 178, 152), "tan": (205, 152, 118), "brown": (158, 106, 76), "dark": (112, 74, 55)}
 """sRGB."""
-LIPS = {"light": (186, 106, 98), "tan": (168, 96, 84), "brown": (128, 72, 62), "dark": (92, 54, 50)}
+LIPS = {"light": (186, 106, 98), "tan": (168, 96, 84), "brown": (128, 72, 62), "dark": (104, 60, 55)}
 
 
 @functools.cache
@@ -198,8 +198,8 @@ def _brows(x: np.ndarray, up: np.ndarray, front: np.ndarray, row: dict, seed: in
     """(SIDE, SIDE) how much of a brow's hair there is."""
     side = np.abs(x)
     thick = (0.056 if row["sex"] == "male" else 0.04) * (0.6 if row["age"] < 12 else 1.0) * row.get("brows", 1.0)
-    middle = np.interp(side, [0.1, 0.2, 0.36, 0.5, 0.6], [7.47, 7.50, 7.545, 7.52, 7.45])
-    width = thick * np.interp(side, [0.08, 0.13, 0.3, 0.5, 0.62], [0.0, 1.0, 1.0, 0.55, 0.0])
+    middle = np.interp(side, [0.1, 0.2, 0.36, 0.5, 0.6], [7.50, 7.515, 7.55, 7.52, 7.45])
+    width = thick * np.interp(side, [0.09, 0.16, 0.3, 0.5, 0.62], [0.0, 0.8, 1.0, 0.6, 0.0])
     gap = np.abs(up - middle) / np.maximum(width, 1e-4)
     points = np.stack([(x * 1.0 + np.sign(x) * 0.6 * (up - 7.5)) * 3.0, up * 0.9, 0 * x], -1).reshape(-1, 3)
     hairs = noise(points, 0.06, np.random.default_rng(seed), 12).reshape(x.shape)
