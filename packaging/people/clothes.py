@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -218,20 +219,23 @@ def dress(w: Wearer, clothes: Mapping[str, Mapping[str, object]]) -> tuple[list[
     """All clothes, the innermost first, and the fields inside which the skin is hidden."""
     body = layer("body", w.place)
     shell: Shell = (body.place, body.normals())
-    worn, hidden = [], []
+    worn: list[tuple[Worn, Field | None]] = []
     for name, row in clothes.items():
         kind, looks = GARMENTS[str(row["kind"])], {k: v for k, v in row.items() if k != "kind"}
         options = {k: looks.pop(k) for k in ("length", "sleeves", "neck", "vee", "width") if k in looks}
+        sole = {"color": looks.pop("sole", [0.85, 0.84, 0.8]), "roughness": 0.7}
         for suffix, x, edge in kind(w, shell, **options):
-            look = dict(looks)
-            if suffix == "_sole":
-                look = {"color": looks.get("sole", [0.85, 0.84, 0.8]), "roughness": 0.7}
-            look.pop("sole", None)
-            worn.append(Worn(name + suffix, x, look))
-            if edge:
-                hidden.append(edge)
+            worn.append((Worn(name + suffix, x, sole if suffix == "_sole" else dict(looks)), edge))
             shell = grown(shell, x)
-    return worn, hidden
+    hidden = [edge for _, edge in worn if edge]
+    for k, (item, _) in enumerate(worn):  # what is covered goes, or it would show in some pose
+        above_it = [
+            edge for other, edge in worn[k + 1 :] if edge and other.name.split("_")[0] != item.name.split("_")[0]
+        ]
+        if above_it:
+            cut = clipped(item.layer, 0.025 * w.scale - np.maximum.reduce([f(item.layer) for f in above_it]))
+            worn[k] = (dataclasses.replace(item, layer=cut), None)
+    return [item for item, _ in worn], hidden
 
 
 Made = list[tuple[str, Layer, Field | None]]
