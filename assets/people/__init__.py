@@ -9,16 +9,6 @@ from embodied.assets.people.pose import JOINTS, POSES, SITTING, STANDING, gaze
 from embodied.assets.people.pose import BodyPose as Pose
 
 __all__ = [
-    "JOINTS",
-    "POSES",
-    "SITTING",
-    "STANDING",
-    "Person",
-    "Pose",
-    "gaze",
-    "ground",
-    "joint_positions",
-    "people",
-    "posed",
+    "JOINTS", "POSES", "SITTING", "STANDING", "Person", "Pose", "gaze", "ground", "joint_positions", "people", "posed",
     "seated",
-]
+]  # fmt: skip
