@@ -11,14 +11,11 @@ from embodied.assets.built.primitives import fitted
 from embodied.assets.people.bodies import STILL, PersonModel, people, posed, still_pose
 from embodied.assets.records import Asset, MeshPart, Size
 
-LICENCE = "CC0-1.0"
-
 
 def _make(
     person: PersonModel, usual: str, size: Size, params: Sequence[tuple[str, str | float]], finish: FinishOf
 ) -> tuple[MeshPart, ...]:
-    pose = str(dict(params).get("pose", usual))
-    parts = posed(person, still_pose(person, pose), finish=finish)
+    parts = posed(person, still_pose(person, pose := str(dict(params).get("pose", usual))), finish=finish)
     return fitted(parts, size) if pose == usual else parts
 
 
@@ -36,7 +33,7 @@ def _figure(person: PersonModel, pose: str) -> ParametricAsset:
         tags=("person", STILL[pose], person.sex),
         pack="people",
         creator="MakeHuman",
-        licence=LICENCE,
+        licence="CC0-1.0",
     )
     return ParametricAsset(asset, functools.partial(_make, person, pose), {"pose": pose})
 
