@@ -95,6 +95,7 @@ class RolloutOptions(Filmed, Viewers, Furnished, Printed):
 def run(args: RolloutOptions) -> None:
     from embodied.envs.base import HelpEnv
     from embodied.evaluation.evaluate import play
+    from embodied.generate import generate_house
     from embodied.kinds.metrics import PER_EPISODE
     from embodied.language import People
     from embodied.policies.baselines import WITHOUT_LEARNING
@@ -102,12 +103,18 @@ def run(args: RolloutOptions) -> None:
     from embodied.tasks.goals import find_pool, find_task
     from embodied.viz.recording import PictureSizes, record_episode
     from embodied.viz.sinks import Sinks
+    from embodied.world import open_folder, open_world
 
     check_machine("unlit" if args.house else args.pictures)  # a house may be lit already
     check_viewer(args)
     camera = PhotoCamera(args.camera, args.seed)
-    with world_of(args) as world:
-        fetch(world.catalogue, world.house)
+    catalogue, drawn = catalogue_of(args), parse_pictures(args.pictures, args.size)
+    if args.house:
+        opened = open_folder(args.house, catalogue, args.cache, drawn)
+    else:
+        opened = open_world(generate_house(args.seed, catalogue=catalogue), catalogue, args.cache, drawn)
+    with opened as world:
+        fetch(catalogue, world.house)
         pool = find_pool(world, seed=args.seed)
         if args.episodes > len(pool):
             raise ValueError(
@@ -133,18 +140,6 @@ def run(args: RolloutOptions) -> None:
         facts |= {"camera": args.camera, "episodes": rows}
     lines = [f"{r['task']}  {'ok  ' if r['success'] else 'miss'} SPL {r['spl']:.2f}  {r['request']}" for r in rows]
     show(args, facts, "\n".join(lines))
-
-
-def world_of(args: RolloutOptions) -> World:
-    """The world of --house, or of the generated house of --seed."""
-    from embodied.generate import generate_house
-    from embodied.world import open_folder, open_world
-
-    catalogue, drawn = catalogue_of(args), parse_pictures(args.pictures, args.size)
-    if args.house:
-        return open_folder(args.house, catalogue, args.cache, drawn)
-    house = generate_house(args.seed, catalogue=catalogue)
-    return open_world(house, catalogue, args.cache, drawn)
 
 
 def numbered(path: Path, number: int, total: int) -> Path:

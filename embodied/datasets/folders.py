@@ -19,7 +19,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -146,18 +146,6 @@ def largest_batch(data: Dataset) -> int:
     return min((1 if s == "train" else 2) * len(data.tasks(s)) for s in data.splits)
 
 
-def sought(task: Task) -> FindObject:
-    """The object that a task of HANNA or VNLA looks for."""
-    assert isinstance(task.goal, FindObject), "they look for objects"
-    return task.goal
-
-
-def route_of(task: Task) -> FollowRoute:
-    """The route that a task of Room-to-Room follows."""
-    assert isinstance(task.goal, FollowRoute), "they follow routes"
-    return task.goal
-
-
 def names_of(data: Dataset) -> list[str]:
     """The houses of all splits."""
     return sorted({n for s in data.splits for n in data.names(s)})
@@ -175,7 +163,7 @@ def _hanna(data: Dataset, root: Path) -> list[Path]:
         words.update(w for r in data.routes(name) if r.split == "train_seen" for w in tokenised(r.instruction).split())
     begin: dict[str, tuple[str, ...]] = {"train": ("train",), "val": ("val",), "test": ("test", "ood")}
     groups = {g: [scan_name(n) for n in names_of(data) if n.startswith(b)] for g, b in begin.items()}
-    objects = sorted({sought(t).object_class for s in data.splits for t in data.tasks(s)})
+    objects = sorted({cast(FindObject, t.goal).object_class for s in data.splits for t in data.tasks(s)})
     return [
         *files,
         _json(home / "routes.json", routes),
@@ -256,7 +244,7 @@ def _vnla_item(task: Task, number: int, place: StoredPlace, teacher: VnlaTeacher
         "trajectories": [[list(CAMERA[w]) for w in plan.words(task.start, (g,), LONGEST_TEACHING)[0]] for g in goals],
         "start_region_name": region_name(room[rooms[task.start.node]].kind),
         "end_region_name": region_name(room[rooms[nearest(place.graph, task.start.node, goals)]].kind),
-        "object_name": sought(task).object_class,
+        "object_name": cast(FindObject, task.goal).object_class,
     }
 
 
@@ -324,7 +312,7 @@ def _paths(data: Dataset, split: str, numbers: Iterator[int]) -> Iterator[Item]:
     """One item per path with all its wordings: three, or fewer where one was held out, or more."""
     by_path: dict[tuple[str, tuple[int, ...]], list[Task]] = {}
     for t in data.tasks(split):
-        by_path.setdefault((t.world, route_of(t).path), []).append(t)
+        by_path.setdefault((t.world, cast(FollowRoute, t.goal).path), []).append(t)
     for (name, path), tasks in by_path.items():
         graph, texts = data.place(name).graph, [t.request for t in tasks]
         yield {

@@ -70,13 +70,9 @@ Columns = Mapping[str, tuple[pa.DataType, tuple[str, ...] | None]]
 STEP_COLUMNS: Columns = {
     "observation.state": (pa.list_(pa.float32(), len(STATE)), STATE),
     "action": (pa.list_(pa.float32(), len(ACTION)), ACTION),
-    "next.done": (pa.bool_(), None),
-    "next.success": (pa.bool_(), None),
+    **dict.fromkeys(("next.done", "next.success"), (pa.bool_(), None)),
     "timestamp": (pa.float32(), None),
-    "frame_index": (pa.int64(), None),
-    "episode_index": (pa.int64(), None),
-    "index": (pa.int64(), None),
-    "task_index": (pa.int64(), None),
+    **dict.fromkeys(("frame_index", "episode_index", "index", "task_index"), (pa.int64(), None)),
 }
 """Of one step: type, and names where it is a vector."""
 MOST_CANDIDATES = 24

@@ -116,7 +116,8 @@ class HannaTeacher(ShortestTeacher):
                 continue
             key = (here, step.instruction)  # v_t = v_t', l_t = l_t' in Eq 4.12
             past = mistakes.setdefault(key, {})
-            labels.append(Label(reference, ask, reasons, tuple(_action_to(v, step) for v in past)))
+            again = (Stop() if v == step.pose.node else Move(step.candidate_nodes.index(v)) for v in past)
+            labels.append(Label(reference, ask, reasons, tuple(again)))
             if step.action != reference:
                 past[_chosen(step)] = None
         return tuple(labels)
@@ -153,7 +154,3 @@ def _lost_in(segment: Sequence[Step], graph: NavGraph) -> list[bool]:
 def _chosen(step: Step) -> int:
     """The node that a navigation action chose; its own for stop."""
     return step.candidate_nodes[step.action.candidate] if isinstance(step.action, Move) else step.pose.node
-
-
-def _action_to(node: int, step: Step) -> Move | Stop:
-    return Stop() if node == step.pose.node else Move(step.candidate_nodes.index(node))
