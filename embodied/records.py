@@ -177,6 +177,8 @@ RECORD_RULES |= {
 
 
 Identity = Mapping[str, Any]
+"""All that a finished thing depends on, written beside it and compared before it is believed: settings, digests of data
+and of weights that were begun with, and the digest of the code (`makers` and all that they import)."""
 CODE, MAKERS = "code", "makers"
 """The parts of an identity that say which code made a thing."""
 

@@ -50,6 +50,8 @@ def stream(seed: int, *names: str | int) -> np.random.Generator:
 T = TypeVar("T")
 FAMILIAR, NOVEL = "familiar", "novel"
 NOVELTIES = (FAMILIAR, NOVEL)
+"""Of models, looks, words and templates: data sets with houses out of distribution (`test_ood`) build all others of
+'familiar' things, and those of 'novel' ones, which are kept from learning. None: all there is may be used."""
 SHARE = 0.25
 """Of several alternatives, how many are novel."""
 FEWEST = 4

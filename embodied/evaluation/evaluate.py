@@ -95,7 +95,7 @@ class Frame:
 def rollout(
     make_env: Callable[[], HelpEnv], player: Agent, tasks: Iterable[Task], *, seed: int, batch: int = 1, agent: str = ""
 ) -> Iterator[Frame]:
-    """Play `tasks`, `batch` at a time; frames of one episode come in order.
+    """Play `tasks`, `batch` at a time; frames of one episode come in order, for who streams, saves, trains or measures.
 
     Every episode gets its own generator, stream(seed, 'policy', task id), so what happens in it
     does not depend on the batch, nor on the order of the tasks.

@@ -152,5 +152,8 @@ def plural(noun: str) -> str:
 
 
 def detokenized(text: str) -> str:
-    """'go into the hall . turn left' becomes 'go into the hall. turn left': no blanks before punctuation."""
+    """'go into the hall . turn left' becomes 'go into the hall. turn left': no blanks before punctuation.
+
+    So people write; learners read the words themselves, never these.
+    """
     return re.sub(r" +([.,;:?!]+)(?=\s|$)", r"\1", text)

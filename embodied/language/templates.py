@@ -90,7 +90,8 @@ SPOKEN = from_plain(Words, read_toml(_HERE.with_name("words.toml")))
 
 @dataclass(frozen=True)
 class Speaker:
-    """Habits as probabilities."""
+    """Habits of speech as probabilities: who names landmarks, who counts metres, who chats, who hedges. Some people are
+    kept from learning: who speaks formally, and templates and words that embodied.seeds.novel_among chooses."""
 
     share: float
     """Of all people."""

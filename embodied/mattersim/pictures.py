@@ -1,7 +1,9 @@
 """Skyboxes as `embodied export matterport` writes them, and pictures of them, drawn as the Matterport3D simulator does.
 
 A viewpoint's skybox is one picture of six square tiles beside each other. `TILES` says which of our cube faces each
-tile is and how often it is turned; nothing is resampled, so that a face survives the way out and back.
+tile is and how often it is turned; nothing is resampled, so that a face survives the way out and back. The simulator of
+today reads `<id>_skybox_small.jpg` and `<id>_skybox_depth_small.png` (16 bits, quarters of a millimetre along the ray),
+its first release `<id>_skybox{0..5}_sami.jpg`.
 """
 
 from __future__ import annotations

@@ -120,7 +120,7 @@ ENCODED_KEPT = 600
 
 
 class EncodedPanoramas:
-    """The panoramas of the study's houses; nothing else can be asked for."""
+    """The panoramas of the study's houses, six faces side by side; nothing else can be asked for."""
 
     def __init__(self, files: Mapping[str, PanoramaFile], secret: str) -> None:
         """

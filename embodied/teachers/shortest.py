@@ -87,7 +87,7 @@ def base37_entropy(probabilities: np.ndarray, candidates: Candidates) -> float:
 
 
 class HannaTeacher(ShortestTeacher):
-    """Labels finished episodes: reference actions, help requests with their reasons, mistakes.
+    """Labels finished episodes: reference actions, help requests with their reasons, mistakes (4.2.3, Eq 4.12).
 
     The rule for being lost is the authors' program's, because the text's would teach an agent to ask for help when it
     has arrived. `uncertain_wrong` follows the text: at steps where the
