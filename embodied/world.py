@@ -17,9 +17,8 @@ from embodied.assets.cache import default_cache, digest
 from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.assets.decoding import load_record, save_record
-from embodied.assets.moving_parts import openness_of
 from embodied.house.house import HINGED, House
-from embodied.house.moment import WIDEST, Moment, RigidPose, apart
+from embodied.house.moment import Moment, RigidPose, apart
 from embodied.house.validation import load_lit_house
 from embodied.interface import Sighting
 from embodied.navigation.free_space import closed_doors
@@ -173,42 +172,30 @@ class World:
     def follow(self, model: mujoco.MjModel, data: mujoco.MjData, *, slack: float = SLACK) -> None:
         """Show the bodies of a MuJoCo model as they are now: a robot that was attached to the house's own model, or one
         alone. Call it again after the physics; bodies named as placements of the house move these, and doors on hinges
-        the house's doors, once they are SETTLED away from where they were shown.
+        the house's doors, once they are SETTLED away from where they were shown; `slack` as of `show`."""
+        import mujoco  # late, as these: they read meshes by trimesh
 
-        Args:
-          slack: metres, and thrice as many radians, that something may move until its light is computed anew.
-        """
-        from embodied.scene.bodies import body_name, body_parts, body_poses  # late: it reads meshes by trimesh
+        from embodied.scene.bodies import body_name, body_parts, body_poses
         from embodied.scene.doors import is_of_house, openness
 
+        before, things = self.moment, self.house.placement_by_id
         if self._followed is not model:
             own = {body_name(model, b) for b in range(1, model.nbody) if is_of_house(model, b, self.house)}
             for name, parts in body_parts(model, self.cache / "bodies").items():
                 if name not in own:
                     self.add(name, parts)
-            self._followed = model
-        free = {model.body(b).name for b in model.jnt_bodyid[model.jnt_type == 0]} & {*self.house.placement_by_id}
-        poses = body_poses(model, data, (*self._bodies, *free))
+            rest = mujoco.MjData(model)
+            mujoco.mj_forward(model, rest)
+            self._followed, self._resting = model, (openness(model, rest), body_poses(model, rest, things))
+        free = {model.body(b).name for b in model.jnt_bodyid[model.jnt_type == 0]} & {*things}
+        poses, (shut, rests) = body_poses(model, data, (*self._bodies, *free)), self._resting
         bodies = {name: pose for name, pose in poses.items() if name in self._bodies}
-        before, things, rests = self.moment, self.house.placement_by_id, self._openness_at_rest
-        rest = lambda i: before.moved.get(i) or RigidPose.upright(things[i].position, things[i].yaw)
-        moved = {i: pose for i, pose in poses.items() if i in free and pose.apart(rest(i)) > SETTLED}
-        opened = {
-            i: x
-            for i, x in openness(model, data).items()
-            if abs(x - before.openness.get(i, rests.get(i, 0.0))) > SETTLED
-        }
+        moved = {i: poses[i] for i in sorted(free) if poses[i].apart(before.moved.get(i, rests[i])) > SETTLED}
+        ways = openness(model, data)
+        opened = {i: x for i, x in ways.items() if abs(x - before.openness.get(i, shut[i])) > SETTLED}
         now = {"moved": {**before.moved, **moved}, "openness": {**before.openness, **opened}, "bodies": bodies}
         self._moments[-1] = dataclasses.replace(before, **now)  # type: ignore[arg-type]
         self._bring_up_to_date(slack=slack)
-
-    @functools.cached_property
-    def _openness_at_rest(self) -> dict[str, float]:
-        """By opening, and by placement id and part, as the house has them."""
-        parts = ((p.id, openness_of(p.params)) for p in self.house.placements)
-        return {o.id: min(o.angle / WIDEST, 1.0) for o in self.house.openings} | {
-            f"{thing}/{part}": x for thing, known in parts for part, x in known.items()
-        }
 
     def show(self, moment: Moment, *, slack: float = 0.0) -> None:
         """Bring the house to a moment, in all that is drawn from now on.

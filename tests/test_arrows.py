@@ -19,9 +19,20 @@ HOMES = {
     "mitsuba": ("embodied/light/",),
     "drjit": ("embodied/light/",),
     "mujoco": tuple(
-        f"embodied/{p}" for p in ("gl.py", "world.py", "scene/", "render/", "envs/driven.py", "light/", "bench/")
+        f"embodied/{p}"
+        for p in (
+            "gl.py",
+            "world.py",
+            "scene/",
+            "render/",
+            "envs/driven.py",
+            "envs/robots.py",
+            "gym/robot.py",
+            "light/",
+            "bench/",
+        )
     ),
-    "dm_control": ("embodied/envs/driven.py",),
+    "dm_control": (),
     "OpenGL": ("embodied/gl.py", "embodied/render/"),
     "gymnasium": ("embodied/gym/", "agents/"),
     "starlette": ("embodied/serve/",),

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from embodied.agents.bandit.corpus import _blocks
+from embodied.scene.robots import _loaded
 from embodied.scene.usd import prim_name
 
 ROOT = Path(__file__).parents[1]
@@ -16,7 +17,8 @@ PARSERS = re.compile(
 )
 READERS = {
     "agents/bandit/corpus.py",  # pages of LibreOffice's help, as HTML: attacked below
-    "embodied/envs/driven.py",  # what dm_control has just written itself
+    "embodied/envs/driven.py",  # our own file
+    "embodied/scene/robots.py",  # attacked below
 }
 
 
@@ -46,6 +48,22 @@ def test_entities_of_a_page_of_help_are_not_followed(tmp_path, name):
     )
     text = str(_blocks(page))
     assert "before" in text and "secret" not in text and len(text) < 1000
+
+
+@pytest.mark.parametrize("name", ATTACKS)
+def test_entities_of_a_robot_are_not_followed(tmp_path, name):
+    (tmp_path / "secret.txt").write_text("the secret")
+    dtd, used = ATTACKS[name]
+    robot = tmp_path / "robot.xml"
+    robot.write_text(
+        f"<!DOCTYPE mujoco [{dtd.format(secret=(tmp_path / 'secret.txt').as_uri())}]>"
+        f'<mujoco model="before {used} after"><worldbody/></mujoco>'
+    )
+    try:
+        text = _loaded(robot).modelname
+    except ValueError:
+        text = ""
+    assert "secret" not in text and len(text) < 1000
 
 
 @pytest.mark.parametrize("owner", ['a"><b>/c', "Stühle_1/leaf", "../x", "1", "a b", "椅子_1", "</Mesh>", "{}\n", ""])

@@ -48,7 +48,6 @@ EXTRAS = {
     **dict.fromkeys(("torch", "safetensors", "sacrebleu"), "agents"),
     **dict.fromkeys(("rerun", "rerun_cli", "av", "matplotlib"), "viz"),
     **dict.fromkeys(("pyarrow", "networkx", "trimesh"), "data"),
-    **dict.fromkeys(("dm_control", "dm_env"), "drive"),
 }
 """Which extra of the distribution brings a library that a small installation lacks."""
 

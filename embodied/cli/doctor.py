@@ -72,7 +72,7 @@ def run(args: DoctorOptions) -> int:
         else:  # libraries are found by processes that start when they are there
             again = ["doctor", "--cache", str(args.cache), *["--json"] * args.json]
             return subprocess.run([sys.executable, "-m", "embodied", *again], check=False).returncode
-    for look in (versions, extras, renderer, packs, path_tracer, body, disk):
+    for look in (versions, extras, renderer, packs, path_tracer, disk):
         findings.append(look(args))
         if not args.json:
             print(line(findings[-1]), flush=True)
@@ -190,13 +190,6 @@ def path_tracer(_: DoctorOptions) -> Finding:
         return Finding("path tracer", False, str(e), "until then draw houses without light (unlit)", False)
     variant = next(v for v, _ in VARIANTS if v.startswith(backend))
     return Finding("path tracer", True, f"Mitsuba on {backend} (variant {variant})", needed=False)
-
-
-def body(_: DoctorOptions) -> Finding:
-    """dm-control, which the driven body needs; its dependency labmaze has no wheel for Python 3.13."""
-    installed, missing = _installed(("dm-control",))
-    remedy = "only embodied/Drive-v0 needs it: pip install --no-deps dm-control"
-    return Finding("driven body", not missing, (*installed, "no dm-control")[0], remedy, False)
 
 
 def disk(args: DoctorOptions) -> Finding:

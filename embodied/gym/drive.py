@@ -105,11 +105,14 @@ def seen_space(s: DriveSettings) -> dict[str, spaces.Box]:
 
 
 def make(*, render_mode: str | None = None, **options: Any) -> DriveEnv:
-    """The environment; options as of `make_driving`."""
-    return DriveEnv(make_driving(**options), render_mode=render_mode)
+    """The environment; options as of `chosen_worlds`, and fields of DriveSettings."""
+    worlds, settings = chosen_worlds(**options)
+    if isinstance(observations := settings.get("observations"), str):
+        settings["observations"] = (observations,)
+    return DriveEnv(Driving(worlds, DriveSettings(**settings)), render_mode=render_mode)
 
 
-def make_driving(
+def chosen_worlds(
     *,
     data: str | Path | None = None,
     split: str = "train",
@@ -117,22 +120,19 @@ def make_driving(
     cache: str | Path | None = None,
     pictures: PictureSettings | str | None = None,
     worlds: Mapping[str, World] | None = None,
-    **settings: Any,
-) -> Driving:
-    """Driving in the houses of a data set, in given worlds, or in one flat that is generated from `seed` and lit.
+    **others: Any,
+) -> tuple[Mapping[str, World], dict[str, Any]]:
+    """The houses of a data set, given worlds, or one flat that is generated from `seed` and lit; and other options.
 
     Args:
       data, split: of any kind; the light of its houses is baked where the cache does not have it.
       pictures: how houses are drawn; as the data set's pictures are without reflections, 'fast-matte' elsewhere: every
         command is a picture of its own, and reflections take more than twice the time.
-      settings: fields of DriveSettings.
     """
-    if isinstance(observations := settings.get("observations"), str):
-        settings["observations"] = (observations,)
-    wanted, where = DriveSettings(**settings), Path(cache) if cache else default_cache()
+    where = Path(cache) if cache else default_cache()
     if worlds is None:
         worlds = data_worlds(Path(data), split, where, pictures) if data else flat_worlds(seed, where, pictures)
-    return Driving(worlds, wanted)
+    return worlds, others
 
 
 def data_worlds(data: Path, split: str, cache: Path, pictures: PictureSettings | str | None) -> dict[str, World]:

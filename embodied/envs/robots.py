@@ -1,0 +1,166 @@
+"""A robot in the physics of a house: what it feels, how it rolls, what it holds, opens and touches."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from embodied.envs.driven import touches
+from embodied.geometry import rotation, wrap
+from embodied.house.house import House
+from embodied.scene.model import COLLISION
+from embodied.scene.robots import ROLLING, PlacedRobot
+
+GRASP, LETS_GO = 0.15, 0.3
+"""Metres from the hand within which an assisted grasp takes hold, and at which a handle slips away: Habitat's rule, in
+which a thing that is held touches nothing and a handle follows the hand."""
+PERIOD = 0.02
+"""Seconds after which velocities are set and what is held is brought to the hand."""
+UNITS = {int(mujoco.mjtJoint.mjJNT_SLIDE): "m", int(mujoco.mjtJoint.mjJNT_HINGE): "rad"}
+FETCHER = Path(__file__).parent / "fetcher.xml"
+"""A mobile manipulator of our own, to be placed rolling; its hand is the site 'grip'."""
+
+
+class RobotBody:
+    """Owns the physics of one house with a robot in it."""
+
+    def __init__(self, house: House, spec: mujoco.MjSpec, placed: PlacedRobot, *, hand: str, assisted: bool) -> None:
+        """`hand`: site or body of the robot; `assisted`: it holds what is within GRASP, not by its fingers alone."""
+        self.house, self.placed, self.assisted, self.model = house, placed, assisted, spec.compile()
+        m, start = self.model, f"{placed.name}/"
+        self.data = mujoco.MjData(m)
+        bodies, sites = ({of(k).name: k for k in range(n)} for n, of in ((m.nbody, m.body), (m.nsite, m.site)))
+        self.root = min(b for name, b in bodies.items() if name.startswith(start))
+        """Body of its base."""
+        if start + hand not in {*bodies, *sites}:
+            raise ValueError(f"the robot has no site or body {hand!r} for a hand")
+        self._hand = self.data.site(start + hand).xpos if start + hand in sites else self.data.body(start + hand).xpos
+        rolls = f"{start}rolling" in bodies
+        self._base = [m.joint(start + k).qposadr[0] for k in ROLLING] if rolls else []
+        self._wheels = [m.actuator(start + k).id for k in ROLLING] if rolls else []
+        self.arm = [a for a in range(m.nu) if m.actuator(a).name.startswith(start) and a not in self._wheels]
+        """Numbers of its actuators but those of a rolling base."""
+        own = [j for j in range(m.njnt) if m.joint(j).name.startswith(start) and m.jnt_qposadr[j] not in self._base]
+        self._joints = [j for j in own if m.jnt_type[j] in UNITS]
+        words = [f"{m.joint(j).name} {UNITS[m.jnt_type[j]]}" for j in self._joints]
+        self.feels = (*words, *(f"{x}/s" for x in words), "ahead m/s", "left m/s", "turn rad/s", "holds")
+        """Names and units of `proprioception`."""
+        self._is_own = np.array([m.body(b).name.startswith(start) for b in m.geom_bodyid])
+        self.things = {n: b for n, b in bodies.items() if n in house.placement_by_id and m.body_jntnum[b]}
+        """Bodies of what can be taken, by placement id."""
+        self.handles = {n.removesuffix("_handle"): b for n, b in bodies.items() if "_handle" in n and "/" not in n}
+        """Bodies of handles, by what they open."""
+        self.held: str | None = None
+        """The thing, or what it opens, that an assisted hand holds."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Everything at rest, and the robot at its start."""
+        self._let_go()
+        mujoco.mj_resetDataKeyframe(self.model, self.data, self.model.key(f"{self.placed.name}/start").id)
+        self.metres, self.force, self.met, self.rolling = 0.0, 0.0, frozenset[str](), np.zeros(3)
+        """Metres of its way; the largest force, N, and owners of what it touched in the last step; and velocities of a
+        rolling base, ahead, to the left and around, metres and radians per second."""
+        mujoco.mj_forward(self.model, self.data)
+
+    def stand(self, xy: np.ndarray, yaw: float) -> None:
+        """Put a robot that rolls elsewhere on its floor; any other stays."""
+        if self._base:
+            self.data.qpos[self._base] = np.subtract((*xy, yaw), (*self.placed.pose[:2], self.placed.pose[3]))
+            mujoco.mj_forward(self.model, self.data)
+
+    @property
+    def position(self) -> np.ndarray:
+        """(2,) metres, world."""
+        return self.data.xpos[self.root][:2].copy()
+
+    @property
+    def yaw(self) -> float:
+        turned = self.data.xmat[self.root]
+        return float(wrap(math.atan2(turned[3], turned[0]) + (self.placed.pose[3] if self._base else 0.0)))
+
+    @property
+    def hand(self) -> np.ndarray:
+        """(3,) metres, world."""
+        return self._hand.copy()
+
+    def step(self, seconds: float, *, holding: bool = False) -> None:
+        """Let time pass while `rolling` and the controls are held; `holding` is whether an assisted hand is closed."""
+        met, before, force, self.force = set[str](), self.position, np.zeros(6), 0.0
+        for _ in range(max(1, round(seconds / PERIOD))):
+            if self._wheels:
+                self.data.ctrl[self._wheels] = *(rotation(self.yaw) @ self.rolling[:2]), self.rolling[2]
+            mujoco.mj_step(self.model, self.data, max(1, round(PERIOD / self.model.opt.timestep)))
+            if self.assisted:
+                self._hold() if holding else self._let_go()
+            for k, owner in touches(self.model, self.data, self._is_own):
+                mujoco.mj_contactForce(self.model, self.data, k, force)
+                self.force = max(self.force, float(force[0]))
+                met.add(owner)
+        self.metres, self.met = self.metres + float(np.linalg.norm(self.position - before)), frozenset(met)
+
+    def proprioception(self) -> np.ndarray:
+        """(len(feels),) float32: joints, their speeds, motion of the base, and 1 where a hand holds something."""
+        adr, dof, v = self.model.jnt_qposadr[self._joints], self.model.jnt_dofadr[self._joints], np.zeros(6)
+        mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_XBODY, self.root, v, 0)
+        motion = *(rotation(-self.yaw) @ v[3:5]), v[2], float(self.held is not None)
+        return np.concatenate([self.data.qpos[adr], self.data.qvel[dof], motion]).astype(np.float32)
+
+    def thing(self, name: str) -> np.ndarray:
+        """(3,) centre of mass of a thing, metres, world."""
+        return self.data.xipos[self.things[name]].copy()
+
+    def _let_go(self) -> None:
+        if self.held is not None and self.held in self.things:
+            self._be_solid(self.held, True)
+        self.held = None
+
+    def _hold(self) -> None:
+        if self.held is None:
+            self._take()
+        if self.held in self.things:
+            joint = self.model.body_jntadr[self.things[self.held]]
+            adr, dof = self.model.jnt_qposadr[joint], self.model.jnt_dofadr[joint]
+            self.data.qpos[adr : adr + 3] = self.hand + self._offset
+            self.data.qvel[dof : dof + 6] = 0.0
+        elif self.held is not None:
+            self._pull(self.handles[self.held])
+
+    def _take(self) -> None:
+        """Take hold of what is within GRASP and has its middle nearest to the hand."""
+        hand, near = self.hand, {}
+        for name, b in {**self.handles, **self.things}.items():
+            away = float(np.linalg.norm(hand - self.data.xipos[b]))
+            if (p := self.house.placement_by_id.get(name)) is not None:
+                local = self.data.xmat[b].reshape(3, 3).T @ (hand - self.data.xpos[b]) - (0, 0, p.size[2] / 2)
+                outside = float(np.linalg.norm(np.maximum(np.abs(local) - np.array(p.size) / 2, 0)))
+            if (away if p is None else outside) <= GRASP:
+                near[name] = away
+        if near:
+            self.held = min(near, key=lambda n: near[n])
+            if self.held in self.things:
+                self._offset = self.data.xpos[self.things[self.held]] - hand
+                self._be_solid(self.held, False)
+
+    def _be_solid(self, thing: str, solid: bool) -> None:
+        first = self.model.body_geomadr[b := self.things[thing]]
+        for g in range(first, first + self.model.body_geomnum[b]):
+            touches = int(solid and self.model.geom_group[g] == COLLISION)
+            self.model.geom_contype[g] = self.model.geom_conaffinity[g] = touches
+
+    def _pull(self, handle: int) -> None:
+        """Bring a joint to where its handle is nearest to the hand."""
+        joint, at = self.model.body_jntadr[self.model.body_parentid[handle]], self.data.xipos[handle]
+        error, way = self.hand - at, self.data.xaxis[joint]
+        if np.linalg.norm(error) > LETS_GO:
+            self.held = None
+            return
+        if self.model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
+            way = np.cross(way, at - self.data.xanchor[joint])
+        adr = self.model.jnt_qposadr[joint]
+        turned = self.data.qpos[adr] + np.clip(way @ error / (way @ way), -0.1, 0.1)
+        self.data.qpos[adr] = np.clip(turned, *self.model.jnt_range[joint])
+        self.data.qvel[self.model.jnt_dofadr[joint]] = 0.0

@@ -1,0 +1,269 @@
+"""embodied/Robot-v0: a robot of any MJCF in lit houses, that reaches, finds, opens and picks up things.
+
+    env = gymnasium.make("embodied/Robot-v0", task="pick", robot="panda.xml", hand="gripper", data="DIR")
+
+An action is the velocities of a rolling base and the arm's actuators ("base"), or all actuators, from -1 to 1; with
+assisted grasps its last number, above 0.5, closes the hand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from gymnasium import spaces
+
+from embodied.envs.robots import FETCHER, RobotBody
+from embodied.gym.drive import VIEW, LiveEnv, chosen_worlds
+from embodied.gym.driving import POINTS, TEXT
+from embodied.gym.sensors import LARGE, PIXELS, check_live, live_pixels, pixel_spaces
+from embodied.gym.spaces import codes_of
+from embodied.navigation.floor_ways import FloorWays
+from embodied.render.camera import camera_of
+from embodied.scene.doors import openness
+from embodied.scene.robots import place
+from embodied.seeds import checked_seed
+from embodied.tasks.ask import look_of
+from embodied.world import SLACK, World, scene_spec
+
+CONTROL = 0.1
+"""Seconds that an action is held."""
+FASTEST_BASE = (0.6, 0.6, 1.5)
+"""Metres and radians per second, ahead, to the left and around."""
+NEAR, RAISED, FALLS, HIGHEST = 1.0, 0.05, 0.2, 1.4
+"""Metres at which a thing is found, by which it is picked up, by which something fell, and above the floor at most of
+what is wanted."""
+OPENED, SHUT = 0.5, 0.1
+"""Openness from which something is open, and below which it is shut."""
+
+
+@dataclass(frozen=True)
+class RobotSettings:
+    """Robot, task, observations and end of an episode."""
+
+    robot: str | Path | mujoco.MjSpec = FETCHER
+    """As of embodied.place."""
+    hand: str = "grip"
+    """Site or body of the robot with which it takes hold."""
+    task: str = "pick"
+    """One of ROBOT_TASKS."""
+    actions: str = "base"
+    """'base' or 'actuators'."""
+    grasp: str = "assisted"
+    """'contact': by the fingers' friction alone; 'assisted': a closed hand holds what is within 15 cm, as Habitat's."""
+    cameras: tuple[str, ...] = ("head",)
+    """Of the robot's file."""
+    observations: tuple[str, ...] = ("rgb",)
+    """Some of embodied.gym.sensors.PIXELS of each camera; nothing for a blind robot."""
+    size: tuple[int, int] = (128, 128)
+    """Height and width, pixels."""
+    seconds: float = 180.0
+    """After which an episode is cut short, in the simulated world."""
+
+    def __post_init__(self) -> None:
+        check_live(self.observations, PIXELS, *self.size)
+        known = {"task": (*ROBOT_TASKS,), "actions": ("base", "actuators"), "grasp": ("contact", "assisted")}
+        for name, values in known.items():
+            if getattr(self, name) not in values:
+                raise ValueError(f"{name} is {getattr(self, name)!r}; use one of {values}")
+
+
+@dataclass(frozen=True)
+class RobotGoal:
+    """Something to do in a house: with a thing, by placement id, or with a part that opens; '' for neither."""
+
+    request: str
+    thing: str
+    part: str
+    cells: np.ndarray
+    """(n,) of the floor, near it."""
+
+
+class RobotEnv(LiveEnv):
+    """Errands of a robot as a Gymnasium environment.
+
+    Reward: 1 on success, minus 0.001 an action. info: success, is_success, spl, metres, seconds, contacts (owners
+    touched), force (the largest, N), fallen (things), openness, grasp, held.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
+
+    def __init__(self, worlds: Mapping[str, World], settings: RobotSettings, render_mode: str | None = None) -> None:
+        super().__init__(render_mode)
+        self.worlds, self.settings = dict(worlds), settings
+        self._bodies: dict[str, tuple[RobotBody, FloorWays]] = {}
+        self._enter(min(self.worlds))
+        body, model = self.body, self.body.model
+        limits, limited = model.actuator_ctrlrange[body.arm], model.actuator_ctrllimited[body.arm].astype(bool)
+        self.middle, self.half = np.where(limited, limits.mean(1), 0.0), np.where(limited, np.ptp(limits, 1) / 2, 1.0)
+        """(n,) controls of the arm are middle + half * action."""
+        rolling = ("ahead", "left", "turn") if settings.actions == "base" else ()
+        hand = ("hold",) if settings.grasp == "assisted" else ()
+        self.commands = (*rolling, *(model.actuator(k).name for k in body.arm), *hand)
+        """Meaning of each number of an action."""
+        self.action_space = spaces.Box(-1.0, 1.0, (len(self.commands),), np.float32)
+        pixels = pixel_spaces(settings.size, settings.observations)
+        seen: dict[str, spaces.Box] = {f"{c}_{name}": space for c in settings.cameras for name, space in pixels.items()}
+        seen["proprio"] = spaces.Box(-LARGE, LARGE, (len(body.feels),), np.float32)
+        self.observation_space = spaces.Dict({**seen, "instruction": spaces.Box(0, 255, (TEXT,), np.uint8)})
+
+    def _enter(self, name: str) -> None:
+        self.world, s = self.worlds[name], self.settings
+        if name not in self._bodies:
+            spec = scene_spec(self.world, None)
+            self._furnish(spec)
+            placed = place(spec, s.robot, rolling=s.actions == "base")
+            body = RobotBody(self.world.house, spec, placed, hand=s.hand, assisted=s.grasp == "assisted")
+            self._bodies[name] = body, FloorWays(self.world.house)
+        self.body, self.ground = self._bodies[name]
+
+    def _furnish(self, spec: mujoco.MjSpec) -> None:
+        """Add to a house, for subclasses."""
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """A start and a goal drawn with this environment's generator; options["world"] chooses the house by name."""
+        super().reset(seed=None if seed is None else checked_seed(seed))
+        names, rng = sorted(self.worlds), self.np_random
+        name = (options or {}).get("world") or names[int(rng.integers(len(names)))]
+        if name not in self.worlds:
+            raise ValueError(f"there is no house {name!r:.80}; choose one of {names[:8]}")
+        self._enter(name)
+        self.body.reset()
+        self.time, self.ended, self.succeeded = 0.0, False, False
+        start = self._begin(rng)
+        self.body.stand(self.ground.xy[start], float(rng.uniform(-math.pi, math.pi)))
+        self.body.step(0.4)
+        self.body.metres, self._fallen = 0.0, set[str]()
+        self.heights = {i: float(self.body.thing(i)[2]) for i in self.body.things}
+        """Of things at the start, metres."""
+        return self._look(), {"world": name, "request": self.goal.request, **self._facts()}
+
+    def _begin(self, rng: np.random.Generator) -> int:
+        """Draw the goal; returns the cell at which the robot starts."""
+        for _ in range(POINTS):
+            start = int(rng.choice(np.flatnonzero(self.ground.room_of_cell != "")))
+            goal = ROBOT_TASKS[self.settings.task][1](self, rng)
+            if goal is not None and len(goal.cells):
+                self.goal, self.shortest = goal, max(float(self.ground.ways(goal.cells).metres[start]), 1e-9)
+                return start
+        raise ValueError(f"house {self.world.name!r} has no goal for {self.settings.task!r}; choose another house")
+
+    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        a, body = np.asarray(action, float).reshape(-1), self.body
+        if a.shape != self.action_space.shape or not np.isfinite(a).all():
+            raise ValueError(f"an action should be {len(self.commands)} finite numbers from -1 to 1, got {action!r}")
+        if self.ended:
+            raise RuntimeError("the episode is over; reset before another step")
+        a = np.clip(a, -1.0, 1.0)
+        if self.settings.actions == "base":
+            body.rolling, a = a[:3] * FASTEST_BASE, a[3:]
+        body.data.ctrl[body.arm] = self.middle + self.half * a[: len(body.arm)]
+        body.step(CONTROL, holding=body.assisted and a[-1] > 0.5)
+        self.time += CONTROL
+        self._fallen |= {i for i, z in self.heights.items() if i != body.held and body.thing(i)[2] < z - FALLS}
+        self.succeeded = ROBOT_TASKS[self.settings.task][2](self)
+        late = self.time >= self.settings.seconds - 1e-9 and not self.succeeded
+        self.ended = self.succeeded or late
+        return self._look(), float(self.succeeded) - 0.001, self.succeeded, late, self._facts()
+
+    def _facts(self) -> dict[str, Any]:
+        body, success = self.body, float(self.succeeded)
+        facts: dict[str, Any] = {
+            "success": success,
+            "is_success": self.succeeded,
+            "metres": body.metres,
+            "seconds": self.time,
+        }
+        facts |= {"spl": success * self.shortest / max(body.metres, self.shortest), "force": body.force}
+        facts |= {"contacts": tuple(sorted(body.met)), "fallen": tuple(sorted(self._fallen)), "held": body.held or ""}
+        return {**facts, "grasp": self.settings.grasp, "openness": self.openness}
+
+    @property
+    def openness(self) -> dict[str, float]:
+        """How far doors and furniture are open, 0 to 1, as World.openable names them."""
+        return openness(self.body.model, self.body.data)
+
+    def _look(self) -> dict[str, Any]:
+        s, seen = self.settings, dict[str, Any]()
+        if s.observations and self.world.pictures.quality is not None:
+            self.world.follow(self.body.model, self.body.data, slack=3 * SLACK)
+        for name in s.cameras if s.observations else ():
+            camera = camera_of(self.body.model, self.body.data, f"robot/{name}")
+            seen |= {f"{name}_{k}": v for k, v in live_pixels(self.world, camera, s.size, s.observations).items()}
+        return {**seen, "proprio": self.body.proprioception(), "instruction": codes_of(self.goal.request, TEXT).copy()}
+
+    def _picture(self) -> np.ndarray:
+        camera = camera_of(self.body.model, self.body.data, f"robot/{self.settings.cameras[0]}")
+        return self.world.renderer.rgb(camera, VIEW)
+
+    @property
+    def target(self) -> np.ndarray:
+        """(3,) where the thing is, metres, world."""
+        return self.body.thing(self.goal.thing)
+
+    def cells_near(self, point: np.ndarray | tuple[float, ...], room: str) -> np.ndarray:
+        """(n,) cells of a room within NEAR of a point."""
+        close = np.linalg.norm(self.ground.xy - point[:2], axis=1) <= NEAR
+        return np.flatnonzero(close & (self.ground.room_of_cell == room))
+
+    def close(self) -> None:
+        for world in self.worlds.values():
+            world.close()
+
+
+# Tasks ------------------------------------------------------------------------------------------
+
+
+def some_thing(env: RobotEnv, rng: np.random.Generator) -> RobotGoal | None:
+    """Something that a hand can take."""
+    of, names = env.world.house.placement_by_id, sorted(env.body.things)
+    if not names or (p := of[names[int(rng.integers(len(names)))]]).position[2] > HIGHEST:
+        return None
+    name = " ".join([*look_of(env.world.catalogue)(p)[:1], p.object_class])
+    request = ROBOT_TASKS[env.settings.task][0].format(name)[:TEXT]
+    return RobotGoal(request, p.id, "", env.cells_near(p.position, p.room))
+
+
+def shut_parts(env: RobotEnv) -> list[str]:
+    """Doors and drawers of furniture that are shut, with handles that a hand can reach."""
+    handles = {name: env.body.data.xipos[b][2] for name, b in env.body.handles.items()}
+    shut = (n for n, x in env.openness.items() if "/" in n and x < SHUT)
+    return sorted(n for n in shut if 0.15 <= handles[n.replace("/", "_")] <= HIGHEST and not n.endswith("lid"))
+
+
+def some_part(env: RobotEnv, rng: np.random.Generator) -> RobotGoal | None:
+    """Something shut."""
+    if not (parts := shut_parts(env)):
+        return None
+    part = parts[int(rng.integers(len(parts)))]
+    p, name = env.world.house.placement_by_id[part.partition("/")[0]], part.partition("/")[2].replace("_", " ")
+    return RobotGoal(f"open the {name} of the {p.object_class}"[:TEXT], "", part, env.cells_near(p.position, p.room))
+
+
+def picked(env: RobotEnv) -> bool:
+    """True where the thing is raised and touches the robot."""
+    name = env.goal.thing
+    return bool(env.target[2] > env.heights[name] + RAISED) and name in (env.body.held, *env.body.met)
+
+
+ROBOT_TASKS: dict[str, tuple[str, Callable[..., RobotGoal | None], Callable[[RobotEnv], bool]]] = {
+    "reach": ("touch the {}", some_thing, lambda env: env.goal.thing in (env.body.held, *env.body.met)),
+    "find": ("go to the {}", some_thing, lambda env: math.dist(env.target[:2], env.body.position) <= NEAR),
+    "open": ("open the {}", some_part, lambda env: env.openness[env.goal.part] >= OPENED),
+    "pick": ("pick up the {}", some_thing, picked),
+}
+"""By name: words of a request; (env, rng) -> goal, None where the one that was drawn cannot be had; and success. Add
+your own (examples/bring_me.py)."""
+
+
+def make(*, render_mode: str | None = None, **options: Any) -> RobotEnv:
+    """The environment; options as of `chosen_worlds`, and fields of RobotSettings."""
+    worlds, settings = chosen_worlds(**options)
+    return RobotEnv(worlds, RobotSettings(**settings), render_mode)
