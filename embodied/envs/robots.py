@@ -50,9 +50,8 @@ class RobotBody:
         """Names and units of `proprioception`."""
         self._is_own = np.array([m.body(b).name.startswith(start) for b in m.geom_bodyid])
         self.things = {n: b for n, b in bodies.items() if n in house.placement_by_id and m.body_jntnum[b]}
-        """Bodies of what can be taken, by placement id."""
         self.handles = {n.removesuffix("_handle"): b for n, b in bodies.items() if "_handle" in n and "/" not in n}
-        """Bodies of handles, by what they open."""
+        """Bodies of what can be taken, by placement id, and of handles, by what they open."""
         self.held: str | None = None
         """The thing, or what it opens, that an assisted hand holds."""
         self.reset()
@@ -146,10 +145,9 @@ class RobotBody:
                 self._be_solid(self.held, False)
 
     def _be_solid(self, thing: str, solid: bool) -> None:
-        first = self.model.body_geomadr[b := self.things[thing]]
-        for g in range(first, first + self.model.body_geomnum[b]):
-            touches = int(solid and self.model.geom_group[g] == COLLISION)
-            self.model.geom_contype[g] = self.model.geom_conaffinity[g] = touches
+        own = np.flatnonzero(self.model.geom_bodyid == self.things[thing])
+        touches = solid * (self.model.geom_group[own] == COLLISION)
+        self.model.geom_contype[own] = self.model.geom_conaffinity[own] = touches
 
     def _pull(self, handle: int) -> None:
         """Bring a joint to where its handle is nearest to the hand."""

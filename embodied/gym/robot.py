@@ -31,15 +31,11 @@ from embodied.seeds import checked_seed
 from embodied.tasks.ask import look_of
 from embodied.world import SLACK, World, scene_spec
 
-CONTROL = 0.1
-"""Seconds that an action is held."""
-FASTEST_BASE = (0.6, 0.6, 1.5)
-"""Metres and radians per second, ahead, to the left and around."""
-NEAR, RAISED, FALLS, HIGHEST = 1.0, 0.05, 0.2, 1.4
+CONTROL, FASTEST_BASE = 0.1, (0.6, 0.6, 1.5)
+"""Seconds that an action is held; metres and radians per second, ahead, to the left and around."""
+NEAR, RAISED, FALLS, HIGHEST, OPENED, SHUT = 1.0, 0.05, 0.2, 1.4, 0.5, 0.1
 """Metres at which a thing is found, by which it is picked up, by which something fell, and above the floor at most of
-what is wanted."""
-OPENED, SHUT = 0.5, 0.1
-"""Openness from which something is open, and below which it is shut."""
+what is wanted; openness from which something is open, and below which it is shut."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +43,8 @@ class RobotSettings:
     """Robot, task, observations and end of an episode."""
 
     robot: str | Path | mujoco.MjSpec = FETCHER
-    """As of embodied.place."""
     hand: str = "grip"
-    """Site or body of the robot with which it takes hold."""
+    """The robot, as of embodied.place, and its site or body with which it takes hold."""
     task: str = "pick"
     """One of ROBOT_TASKS."""
     actions: str = "base"
@@ -57,9 +52,8 @@ class RobotSettings:
     grasp: str = "assisted"
     """'contact': by the fingers' friction alone; 'assisted': a closed hand holds what is within 15 cm, as Habitat's."""
     cameras: tuple[str, ...] = ("head",)
-    """Of the robot's file."""
     observations: tuple[str, ...] = ("rgb",)
-    """Some of embodied.gym.sensors.PIXELS of each camera; nothing for a blind robot."""
+    """Cameras of the robot's file, and some of embodied.gym.sensors.PIXELS of each; nothing for a blind robot."""
     size: tuple[int, int] = (128, 128)
     """Height and width, pixels."""
     seconds: float = 180.0
@@ -142,7 +136,6 @@ class RobotEnv(LiveEnv):
         self.body.step(0.4)
         self.body.metres, self._fallen = 0.0, set[str]()
         self.heights = {i: float(self.body.thing(i)[2]) for i in self.body.things}
-        """Of things at the start, metres."""
         return self._look(), {"world": name, "request": self.goal.request, **self._facts()}
 
     def _begin(self, rng: np.random.Generator) -> int:
@@ -203,11 +196,6 @@ class RobotEnv(LiveEnv):
         camera = camera_of(self.body.model, self.body.data, f"robot/{self.settings.cameras[0]}")
         return self.world.renderer.rgb(camera, VIEW)
 
-    @property
-    def target(self) -> np.ndarray:
-        """(3,) where the thing is, metres, world."""
-        return self.body.thing(self.goal.thing)
-
     def cells_near(self, point: np.ndarray | tuple[float, ...], room: str) -> np.ndarray:
         """(n,) cells of a room within NEAR of a point."""
         close = np.linalg.norm(self.ground.xy - point[:2], axis=1) <= NEAR
@@ -216,9 +204,6 @@ class RobotEnv(LiveEnv):
     def close(self) -> None:
         for world in self.worlds.values():
             world.close()
-
-
-# Tasks ------------------------------------------------------------------------------------------
 
 
 def some_thing(env: RobotEnv, rng: np.random.Generator) -> RobotGoal | None:
@@ -250,12 +235,12 @@ def some_part(env: RobotEnv, rng: np.random.Generator) -> RobotGoal | None:
 def picked(env: RobotEnv) -> bool:
     """True where the thing is raised and touches the robot."""
     name = env.goal.thing
-    return bool(env.target[2] > env.heights[name] + RAISED) and name in (env.body.held, *env.body.met)
+    return bool(env.body.thing(name)[2] > env.heights[name] + RAISED) and name in (env.body.held, *env.body.met)
 
 
 ROBOT_TASKS: dict[str, tuple[str, Callable[..., RobotGoal | None], Callable[[RobotEnv], bool]]] = {
     "reach": ("touch the {}", some_thing, lambda env: env.goal.thing in (env.body.held, *env.body.met)),
-    "find": ("go to the {}", some_thing, lambda env: math.dist(env.target[:2], env.body.position) <= NEAR),
+    "find": ("go to the {}", some_thing, lambda env: env.ground.cell_at(env.body.position) in env.goal.cells),
     "open": ("open the {}", some_part, lambda env: env.openness[env.goal.part] >= OPENED),
     "pick": ("pick up the {}", some_thing, picked),
 }

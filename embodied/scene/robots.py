@@ -20,6 +20,7 @@ from embodied.navigation.graph import build_graph
 from embodied.scene.bodies import shape_of
 from embodied.scene.model import yaw_quat
 
+warnings.filterwarnings("ignore", "Attaching a child without asset dict")  # its files are read all the same
 At: TypeAlias = int | str | Sequence[float] | None
 """A node, a room's id, (x, y), (x, y, yaw) or (x, y, z, yaw); None for the first room with space."""
 Pose: TypeAlias = tuple[float, float, float, float]
@@ -62,9 +63,6 @@ def place(
       rolling: it glides over the floor, by three velocity actuators 'robot/x', 'robot/y' and 'robot/yaw', metres and
         radians per second along the axes of the world: for arms, and for robots whose wheels or legs are not driven.
 
-    Raises:
-      ValueError: no such robot or place, or no floor that is large enough; the spec is not of a house.
-
     Examples:
       >>> import mujoco
       >>> ball = '<mujoco><worldbody><body><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
@@ -85,11 +83,12 @@ def place(
     pose = _pose(House.from_json(known[0]), at, _touching(alone, data))
     changes += [*_options(spec, child), *_contacts(spec, child, alone), *_weights(child, alone)]
     changes += _begin(child, alone, data, pose, rolling)
-    frame = _rolling(spec, start, pose) if rolling else spec.worldbody.add_frame(pos=pose[:3], quat=yaw_quat(pose[3]))
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Attaching a child without asset dict")  # its files are read all the same
-        spec.attach(child, frame=frame, prefix=start)
-    for joint, (*_, gain) in ROLLING.items() if rolling else ():
+    holder = spec.worldbody.add_body(name=f"{start}rolling", pos=pose[:3]) if rolling else spec.worldbody
+    frame = holder.add_frame(pos=[0, 0, 0] if rolling else pose[:3], quat=yaw_quat(pose[3]))
+    spec.attach(child, frame=frame, prefix=start)
+    for joint, (kind, axis, gain) in ROLLING.items() if rolling else ():
+        holder.mass, holder.inertia, holder.explicitinertial = 1.0, [0.1] * 3, True
+        holder.add_joint(name=start + joint, type=kind, axis=axis)
         actuator = spec.add_actuator(name=start + joint, target=start + joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         actuator.set_to_velocity(kv=gain)
     return PlacedRobot(name, pose, tuple(changes))
@@ -108,15 +107,6 @@ def _loaded(robot: str | Path | mujoco.MjSpec) -> mujoco.MjSpec:
         raise ValueError(f"{robot!r} is no file; for robots by name: pip install 'embodied-houses[robots]'") from e
     known = mujoco_menagerie.get(str(robot))
     return known.spec(next(e.name for e in known.entry_points if not e.is_mjx and "scene" not in e.name))
-
-
-def _rolling(spec: mujoco.MjSpec, start: str, pose: Pose) -> mujoco.MjsFrame:
-    """A frame on a body that rolls."""
-    body = spec.worldbody.add_body(name=f"{start}rolling", pos=pose[:3], mass=1.0, inertia=[0.1] * 3)
-    body.explicitinertial = True
-    for joint, (kind, axis, _) in ROLLING.items():
-        body.add_joint(name=start + joint, type=kind, axis=axis)
-    return body.add_frame(quat=yaw_quat(pose[3]))
 
 
 def _begin(
@@ -192,11 +182,11 @@ def _contacts(spec: mujoco.MjSpec, child: mujoco.MjSpec, alone: mujoco.MjModel) 
 
 def _touching(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     """(n, 3) points around what touches, metres, in the robot's frame."""
-    points = [np.zeros((1, 3))]
-    for g in range(model.ngeom):
-        if (model.geom_contype[g] or model.geom_conaffinity[g]) and (shape := shape_of(model, g)) is not None:
+    points = []
+    for g in np.flatnonzero(model.geom_contype | model.geom_conaffinity):
+        if (shape := shape_of(model, int(g))) is not None:
             points.append(shape[0] @ data.geom_xmat[g].reshape(3, 3).T + data.geom_xpos[g])
-    return np.concatenate(points[1:] or points)
+    return np.concatenate(points or [np.zeros((1, 3))])
 
 
 def _pose(house: House, at: At, points: np.ndarray) -> Pose:
@@ -227,7 +217,7 @@ def _pose(house: House, at: At, points: np.ndarray) -> Pose:
         for yaw in turns:
             c, s = math.cos(yaw), math.sin(yaw)
             if space.contains(shapely.affinity.affine_transform(outline, [c, -s, s, c, x, y])):
-                lowest = float(points[:, 2].min())
-                return float(x), float(y), house.storeys[storey].elevation - lowest + CLEARANCE, yaw
+                floor = house.storeys[storey].elevation + CLEARANCE
+                return float(x), float(y), floor - float(points[:, 2].min()), yaw
     size = " x ".join(f"{x:.2f}" for x in np.ptp(points[:, :2], axis=0))
     raise ValueError(f"no free floor for a robot of {size} m at {at!r}; choose a larger room, or (x, y, z, yaw)")
