@@ -33,8 +33,7 @@ class RobotBody:
         m, start = self.model, f"{placed.name}/"
         self.data = mujoco.MjData(m)
         bodies, sites = ({of(k).name: k for k in range(n)} for n, of in ((m.nbody, m.body), (m.nsite, m.site)))
-        self.root = min(b for name, b in bodies.items() if name.startswith(start))
-        """Body of its base."""
+        self.root = min(b for name, b in bodies.items() if name.startswith(start))  # its base
         if start + hand not in {*bodies, *sites}:
             raise ValueError(f"the robot has no site or body {hand!r} for a hand")
         self._hand = self.data.site(start + hand).xpos if start + hand in sites else self.data.body(start + hand).xpos
@@ -42,7 +41,6 @@ class RobotBody:
         self._base = [m.joint(start + k).qposadr[0] for k in ROLLING] if rolls else []
         self._wheels = [m.actuator(start + k).id for k in ROLLING] if rolls else []
         self.arm = [a for a in range(m.nu) if m.actuator(a).name.startswith(start) and a not in self._wheels]
-        """Numbers of its actuators but those of a rolling base."""
         own = [j for j in range(m.njnt) if m.joint(j).name.startswith(start) and m.jnt_qposadr[j] not in self._base]
         self._joints = [j for j in own if m.jnt_type[j] in UNITS]
         words = [f"{m.joint(j).name} {UNITS[m.jnt_type[j]]}" for j in self._joints]

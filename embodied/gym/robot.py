@@ -95,11 +95,9 @@ class RobotEnv(LiveEnv):
         body, model = self.body, self.body.model
         limits, limited = model.actuator_ctrlrange[body.arm], model.actuator_ctrllimited[body.arm].astype(bool)
         self.middle, self.half = np.where(limited, limits.mean(1), 0.0), np.where(limited, np.ptp(limits, 1) / 2, 1.0)
-        """(n,) controls of the arm are middle + half * action."""
         rolling = ("ahead", "left", "turn") if settings.actions == "base" else ()
         hand = ("hold",) if settings.grasp == "assisted" else ()
-        self.commands = (*rolling, *(model.actuator(k).name for k in body.arm), *hand)
-        """Meaning of each number of an action."""
+        self.commands = (*rolling, *(model.actuator(k).name for k in body.arm), *hand)  # an action's numbers
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.commands),), np.float32)
         pixels = pixel_spaces(settings.size, settings.observations)
         seen: dict[str, spaces.Box] = {f"{c}_{name}": space for c in settings.cameras for name, space in pixels.items()}

@@ -23,10 +23,8 @@ from embodied.scene.model import yaw_quat
 warnings.filterwarnings("ignore", "Attaching a child without asset dict")  # its files are read all the same
 At: TypeAlias = int | str | Sequence[float] | None
 """A node, a room's id, (x, y), (x, y, yaw) or (x, y, z, yaw); None for the first room with space."""
-Pose: TypeAlias = tuple[float, float, float, float]
-"""x, y, z in metres and yaw in radians, world."""
-HOUSE = "embodied_house"
-"""Text of a spec that has the JSON of its house."""
+Pose: TypeAlias = tuple[float, float, float, float]  # x, y, z in metres and yaw in radians, world
+HOUSE = "embodied_house"  # text of a spec that has the JSON of its house
 CLEARANCE, LOOKED_AROUND, GRID, TURNS = 0.002, 2.5, 0.1, 12
 """Metres from a robot's lowest point to the floor, around a node in which floor is looked for, and between the places
 that are tried; and directions at each."""
