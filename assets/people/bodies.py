@@ -27,7 +27,7 @@ UNIT, UV_UNIT = 1 / 8192, 1 / 4096
 DETAILS_OF_BODIES = 3
 FIGURE_SEAT = 0.45
 """Height of the seat that sitting figures are made for, metres."""
-STILL = dict.fromkeys(("standing", "talking", "phone", "reading", "leaning"), "standing") | {"sitting": "sitting"}
+STILL = dict.fromkeys(("standing", "waiting", "talking", "leaning"), "standing") | {"sitting": "sitting"}
 """Poses that houses are filled with, and what they are."""
 
 
