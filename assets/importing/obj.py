@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from embodied.assets.importing.meshing import face_normals
+
 MAX_FACES = 2_000_000
 FARTHEST_VERTEX = 1e12
 """Largest coordinate, of vertices in a file's own unit and of textures (the packs have some of 3e9)."""
@@ -331,19 +333,13 @@ def _split(v: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if n == 3:
         return rows, np.tile([0, 1, 2], (m, 1))
     if n == 4:
-        p = points[v]
-        first = _normals(p[:, [0, 1, 2]]), _normals(p[:, [0, 2, 3]])
+        first = face_normals(points, v[:, [0, 1, 2]]), face_normals(points, v[:, [0, 2, 3]])
         fold = np.einsum("ij,ij->i", *first) < 0
         order = np.where(fold[:, None], [0, 1, 3, 1, 2, 3], [0, 1, 2, 0, 2, 3])
         return np.repeat(rows, 2), order.reshape(-1, 3)
     triples = [_triangles(points[row]) for row in v]
     polygon = np.repeat(rows, [len(t) for t in triples])
     return polygon, np.array([t for some in triples for t in some], dtype=np.int64).reshape(-1, 3)
-
-
-def _normals(p: np.ndarray) -> np.ndarray:
-    """(m, 3) normals, twice the area long, of triangles (m, 3, 3)."""
-    return np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
 
 
 def _triangles(p: np.ndarray) -> list[tuple[int, int, int]]:

@@ -157,14 +157,9 @@ def _surface(meshes: Corners, across: Normals, count: int) -> np.ndarray:
 
 def normals(xyz: np.ndarray, faces: np.ndarray) -> Normals:
     """x, y and z, (m,) float64 each, of the normals of triangles `faces` (m, 3), as long as twice their areas."""
-    a, b, c = (np.ascontiguousarray(f) for f in faces.T)
-    one, two = [], []
-    for line in xyz.T.astype(float):
-        start = line[a]
-        one.append(line[b] - start)
-        two.append(line[c] - start)
-    (ux, uy, uz), (vx, vy, vz) = one, two
-    return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    a, b, c = xyz.astype(float)[faces].swapaxes(0, 1)
+    x, y, z = np.cross(b - a, c - a).T
+    return x, y, z
 
 
 def _means(group: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -165,7 +165,7 @@ class Gloss:
             sides = moved[:, 1:] - moved[:, :1]
             normal = np.cross(sides[:, 0], sides[:, 1])
             faces.normal[self._fixed :] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-            self._first = _nearer(self._first_fixed, self._rays_among(moved), moved, self._fixed)
+            self._first = _nearer(self._first_fixed, self._rays_among(moved), self._fixed)
         for page, row, column, part in patches:
             self._repaint(page, row, column, part)
 
@@ -566,28 +566,14 @@ def _glowing(mesh: LitMesh, glow: np.ndarray | None) -> np.ndarray:
     return glow[y, x].max((1, 2)) > 0
 
 
-def _nearer(first: Rays, second: Rays, corners: np.ndarray, count: int) -> Rays:
-    """Rays among two sets of triangles, the second of which, few and near each other, are numbered from `count` on.
-
-    Args:
-      corners: (m, 3, 3) of the second.
-    """
-    low, high = (f(corners.reshape(-1, 3), axis=0) for f in (np.min, np.max))
+def _nearer(first: Rays, second: Rays, count: int) -> Rays:
+    """Rays among two sets of triangles, the second of which is numbered from `count` on."""
 
     def nearer(start: np.ndarray, onward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        one = first(start, onward)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ends = np.stack([(low - start) / onward, (high - start) / onward])
-        begin, end = np.fmin(*ends).max(1), np.fmax(*ends).min(1)
-        which = np.flatnonzero((begin <= end) & (end > 0) & ((one[0] < 0) | (begin < one[1])))
-        if not len(which):
-            return one
-        two = second(start[which], onward[which])
-        near = (two[0] >= 0) & ((one[0][which] < 0) | (two[1] < one[1][which]))
-        which, out = which[near], tuple(np.array(a) for a in one)
-        for a, b in zip(out, (two[0] + count, *two[1:]), strict=True):
-            a[which] = b[near]
-        return out  # type: ignore[return-value]
+        (face, far, u, v), (other, beyond, u2, v2) = first(start, onward), second(start, onward)
+        near = (other >= 0) & ((face < 0) | (beyond < far))
+        both = (face, other + count), (far, beyond), (u, u2), (v, v2)
+        return tuple(np.where(near, b, a) for a, b in both)  # type: ignore[return-value]
 
     return nearer
 

@@ -76,13 +76,14 @@ class Panorama:
           (h, w, 3) uint8, (h, w) float32 metres, (h, w) int32.
         """
         grid = perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *checked(vfov, size))
-        return self._rgb(grid), self._depth(grid), self._ids(grid)
+        return self.through(grid, "rgb"), self.through(grid, "depth"), self.through(grid, "ids")
 
     def view_rgb(
         self, yaw: float, pitch: float = 0.0, vfov: float = VFOV36, size: tuple[int, int] = (480, 640)
     ) -> np.ndarray:
         """The colours of `view` alone."""
-        return self._rgb(perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *checked(vfov, size)))
+        grid = perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *checked(vfov, size))
+        return self.through(grid, "rgb")
 
     def views36(self, size: int = 224) -> np.ndarray:
         """(36, size, size, 3) uint8: the views of the VLN literature, in the order of embodied.interface.
@@ -92,19 +93,19 @@ class Panorama:
         FeatureSource's rows count them. Matterport's own order is in embodied.mattersim.conventions.
         """
         checked(VFOV36, (size, size))
-        return self._rgb(grid36(self.size, size)).reshape(VIEWS, size, size, 3)
+        return self.through(grid36(self.size, size), "rgb").reshape(VIEWS, size, size, 3)
 
     def equirect(self, height: int = 512) -> np.ndarray:
         """(height, 2 height, 3) uint8: all directions; +x (yaw 0) in the middle column, +y left of it, up on top."""
-        return self._rgb(equirect_grid(self.size, checked(1.0, (height, height))[0]))
+        return self.through(equirect_grid(self.size, checked(1.0, (height, height))[0]), "rgb")
 
     def equirect_depth(self, height: int = 512) -> np.ndarray:
         """(height, 2 height) float32: metres along the ray, in the layout of `equirect`."""
-        return self._depth(equirect_grid(self.size, height))
+        return self.through(equirect_grid(self.size, height), "depth")
 
     def equirect_ids(self, height: int = 512) -> np.ndarray:
         """(height, 2 height) int32, in the layout of `equirect`."""
-        return self._ids(equirect_grid(self.size, height))
+        return self.through(equirect_grid(self.size, height), "ids")
 
     def through(self, grid: PixelGrid, channel: str) -> np.ndarray:
         """One channel, 'rgb', 'depth' or 'ids', of the picture that a grid describes; see `view` for units.
@@ -112,9 +113,13 @@ class Panorama:
         Raises:
           ValueError: another channel.
         """
-        if channel not in ("rgb", "depth", "ids"):
+        if channel == "rgb":
+            return resampled_rgb(self._padded_rgba, grid)
+        if channel == "depth":
+            return resampled_depth(self._padded_nearness, grid)
+        if channel != "ids":
             raise ValueError(f"channel is {channel!r}; a panorama holds 'rgb', 'depth' and 'ids'")
-        return {"rgb": self._rgb, "depth": self._depth, "ids": self._ids}[channel](grid)
+        return cv2.remap(self._padded_ids, grid.maps[1], grid.maps[2], cv2.INTER_NEAREST).view(np.int32)
 
     @functools.cached_property
     def _padded_rgba(self) -> np.ndarray:
@@ -130,16 +135,6 @@ class Panorama:
     def _padded_ids(self) -> np.ndarray:
         """The bits of the ids as float32, which OpenCV can copy from place to place."""
         return padded_plane(self.size, lambda k, to: np.copyto(to.view(np.int32), self.ids[k]))
-
-    def _rgb(self, grid: PixelGrid) -> np.ndarray:
-        return resampled_rgb(self._padded_rgba, grid)
-
-    def _depth(self, grid: PixelGrid) -> np.ndarray:
-        return resampled_depth(self._padded_nearness, grid)
-
-    def _ids(self, grid: PixelGrid) -> np.ndarray:
-        _, x, y = grid.maps
-        return cv2.remap(self._padded_ids, x, y, cv2.INTER_NEAREST).view(np.int32)
 
 
 def padded_rgba(s: int, write: Callable[[int, np.ndarray], object]) -> np.ndarray:
