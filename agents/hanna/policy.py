@@ -81,11 +81,6 @@ Steer = Callable[[int, Observation, np.ndarray], Steering]
 """(place in the batch, observation, (n + 1,) probabilities of the actions, stop first) -> what is made of them."""
 
 
-def unsteered(position: int, observation: Observation, moves: np.ndarray) -> Steering:
-    """The networks' moves as they are."""
-    return Steering(moves)
-
-
 @dataclass(frozen=True, eq=False)
 class HannaPolicy:
     """A pair of networks that acts."""
@@ -101,6 +96,14 @@ class HannaPolicy:
     (docs/sources.md, S29), which tells the agent where east is; D.1 leaves the order open, a robot has no compass."""
     read_assistance: bool = True
     """False: on a route the text is empty, 'target image only' of Table 4.4."""
+    learns: bool = False
+    """The networks learn: what they said is kept, with its gradients."""
+    environment_dropout: float = 0.0
+    """Share of feature channels that an episode does not see at all (Tan et al. 2019): every episode
+    plays in a house that looks a little different, so houses cannot be learned by heart."""
+    guided_asking: float = 0.0
+    """Share of the episodes of a batch, the first ones, in which 'every5' asks in place of `ask_rule`: a mixture
+    of policies as in DAgger (Ross et al. 2011)."""
 
     def act(
         self,
@@ -108,13 +111,13 @@ class HannaPolicy:
         memory: HannaMemory | None,
         *,
         rngs: Rngs,
-        steer: Steer = unsteered,
+        steer: Steer | None = None,
         imposed: Sequence[int | None] | None = None,
     ) -> tuple[Actions, HannaMemory]:
         """One step of every running episode; see embodied.interface.Policy.
 
         Args:
-          steer: what is made of the networks' moves before one is chosen.
+          steer: what is made of the networks' moves before one is chosen; None: nothing.
           imposed: navigation actions (0 is stop, c + 1 candidate c) that replace the choice in some episodes; whether
             to ask stays the networks' decision.
         """
@@ -125,15 +128,17 @@ class HannaPolicy:
         if not positions:
             return actions, memory
         percept = self.percept(seen, memory)
-        scores, networks = self.scored(memory, percept)
-        chosen = []
+        with torch.set_grad_enabled(self.learns and torch.is_grad_enabled()):
+            scores, networks = self.scored(memory, percept)
+        chosen, guided = [], round(self.guided_asking * len(observations))
         for row, (position, o, thought) in enumerate(zip(positions, seen, thoughts_of(scores, seen), strict=True)):
             assert thought.moves is not None
-            steering = steer(position, o, np.roll(thought.moves, 1))  # stop first
+            moves = np.roll(thought.moves, 1)  # stop first
+            steering = Steering(moves) if steer is None else steer(position, o, moves)
             index = self.choose(steering.weights, rngs[position])  # drawn before asking, so asking shifts no draw
             given = None if imposed is None else imposed[position]
             index = index if given is None else given
-            rule = self.rule_of(position, len(observations))
+            rule = RULES["every5"][0] if position < guided else self.ask_rule
             thought = dataclasses.replace(thought, match=steering.match)
             actions[position] = asked_or(
                 index, thought, o, None if steering.known else rule, memory.last_ask[row], rngs[position]
@@ -147,21 +152,12 @@ class HannaPolicy:
             previous_action=percept.actions[taken],
             previous_ask=torch.tensor([REQUEST if ask else DO_NOTHING for ask in asks], device=device),
             last_ask=tuple(o.time if ask else t for ask, o, t in zip(asks, seen, memory.last_ask, strict=True)),
-            moments=self.kept(memory.moments, StepScores(positions, scores)),
+            moments=(*memory.moments, StepScores(positions, scores)) if self.learns else (),
         )
 
-    @torch.no_grad()
     def scored(self, memory: HannaMemory, percept: Percept) -> tuple[Scores, tuple[Any, Any]]:
         """Outputs of the networks for a step, and their memories."""
         return self.network(memory.networks, percept)
-
-    def rule_of(self, position: int, episodes: int) -> HannaAskRule:
-        """Who decides when to ask in one of the episodes of a batch."""
-        return self.ask_rule
-
-    def kept(self, moments: tuple[StepScores, ...], moment: StepScores) -> tuple[StepScores, ...]:
-        """The outputs that are remembered."""
-        return ()
 
     def start(self, positions: tuple[int, ...]) -> HannaMemory:
         """Memory before the first step of the episodes at `positions`."""
@@ -172,6 +168,7 @@ class HannaPolicy:
             previous_action=torch.zeros(k, self.network.action_size, device=device),
             previous_ask=torch.full((k,), START, device=device),
             last_ask=(-1,) * k,
+            channels=hidden_channels(k, self.bank.size, self.environment_dropout, device),
         )
 
     def percept(self, observations: Sequence[Observation], memory: HannaMemory) -> Percept:
@@ -240,42 +237,12 @@ def asked_or(
     return Stop(thought) if index == 0 else Move(index - 1, thought)
 
 
-@dataclass(frozen=True, eq=False)
-class TrainingPolicy(HannaPolicy):
-    """The networks as they learn: they keep what they said, with its gradients."""
-
-    environment_dropout: float = 0.0
-    """Share of feature channels that an episode does not see at all (Tan et al. 2019): every episode
-    plays in a house that looks a little different, so houses cannot be learned by heart."""
-    guided_asking: float = 0.0
-    """Share of the episodes of a batch, the first ones, in which 'every5' asks in place of `ask_rule`: a mixture
-    of policies as in DAgger (Ross et al. 2011)."""
-
-    def scored(self, memory: HannaMemory, percept: Percept) -> tuple[Scores, tuple[Any, Any]]:
-        return self.network(memory.networks, percept)
-
-    def rule_of(self, position: int, episodes: int) -> HannaAskRule:
-        return RULES["every5"][0] if position < round(self.guided_asking * episodes) else self.ask_rule
-
-    def kept(self, moments: tuple[StepScores, ...], moment: StepScores) -> tuple[StepScores, ...]:
-        return (*moments, moment)
-
-    def start(self, positions: tuple[int, ...]) -> HannaMemory:
-        memory, device = super().start(positions), next(self.network.parameters()).device
-        channels = hidden_channels(len(positions), self.bank.size, self.environment_dropout, device)
-        return dataclasses.replace(memory, channels=channels)
-
-
 def for_training(
     policy: HannaPolicy,
     ask_rule: HannaAskRule = ask_sampled,
     environment_dropout: float = 0.0,
     guided_asking: float = 0.0,
-) -> TrainingPolicy:
+) -> HannaPolicy:
     """The same networks, sampling their actions and learning."""
-    same = {f.name: getattr(policy, f.name) for f in dataclasses.fields(policy)}
-    return TrainingPolicy(
-        **{**same, "choose": choose_sampled, "ask_rule": ask_rule},
-        environment_dropout=environment_dropout,
-        guided_asking=guided_asking,
-    )
+    policy = dataclasses.replace(policy, choose=choose_sampled, ask_rule=ask_rule, learns=True)
+    return dataclasses.replace(policy, environment_dropout=environment_dropout, guided_asking=guided_asking)

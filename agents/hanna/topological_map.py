@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from embodied.agents.hanna.attention import HEADINGS, VIEWS, action_index
-from embodied.agents.hanna.policy import HannaMemory, HannaPolicy, Steering, unsteered
+from embodied.agents.hanna.policy import HannaMemory, HannaPolicy, Steering
 from embodied.interface import Action, Actions, Mode, Move, Observation, Observations, Rngs, Situations
 from embodied.teachers.shortest import shortest_of
 
@@ -302,7 +302,7 @@ class MapPolicy:
             return Steering(*weigh_by_image(trails[position], o, weights, self.frontier_discount), trail.match)
 
         actions, networks = self.policy.act(
-            observations, memory.networks, rngs=rngs, steer=steer if trails else unsteered, imposed=imposed
+            observations, memory.networks, rngs=rngs, steer=steer if trails else None, imposed=imposed
         )
         left = {i: trail.left(o, actions[i]) for i, trail in trails.items() if (o := observations[i]) is not None}
         return actions, MapMemory(networks, left)
