@@ -16,7 +16,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Unpack
 
 import torch
 from torch import Tensor
@@ -79,8 +79,8 @@ def train(
         return episodes
 
     step = lambda update: train_step(learning, training, update)
-    how: dict[str, Any] = {"total": config.updates, "may_change": MAY_CHANGE}
-    return run(folder, identity, learning.parts, config, step, validate, **how, **options)
+    whole = dataclasses.replace(config, iterations=config.updates)
+    return run(folder, identity, learning.parts, whole, step, validate, may_change=MAY_CHANGE, **options)
 
 
 class IntentionRun:
