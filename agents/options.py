@@ -41,12 +41,6 @@ class Encoded(Drawn):
     encoder: InputPath = SHIPPED_ENCODER
     """An encoder of `embodied train vision` (default: shipped)."""
 
-    def encoder_digest(self) -> str:
-        """The digest of the encoder, which names its features."""
-        from embodied.agents.vision.encoder import load_encoder
-
-        return load_encoder(self.encoder).digest
-
 
 @dataclass(frozen=True, kw_only=True)
 class Threaded:

@@ -36,12 +36,13 @@ class Wish:
 
     button: int
 
+    @property
+    def requests(self) -> tuple[str]:
+        return (str(self.button),)
+
 
 class Buttons:
     """Four buttons; a description names the one that was pressed."""
-
-    def request(self, task: Wish, *, rng: np.random.Generator) -> str:
-        return str(task.button)
 
     def success(self, task: Wish, execution: int) -> bool:
         return task.button == execution

@@ -174,8 +174,8 @@ def labelled(
     """Outputs of the networks in some episodes, beside the teacher's labels; A is the most actions of any
     step."""
     labels = [teacher.relabel(e, worlds[e.task.world]) for e in episodes]
-    rows = [labels[position][t] for t, m in enumerate(moments) for position in m.positions]
-    scores = [m.scores for m in moments]
+    rows = [labels[position][t] for t, (positions, _) in enumerate(moments) for position in positions]
+    scores = [s for _, s in moments]
     most, device = max(s.navigation.shape[1] for s in scores), scores[0].navigation.device
     negatives = np.zeros((len(rows), most), dtype=bool)
     for i, label in enumerate(rows):

@@ -42,14 +42,8 @@ from embodied.interface import (
     Thought,
 )
 
-
-@dataclass(frozen=True, eq=False)
-class StepScores:
-    """Outputs of the networks in one step, for the episodes that were still running."""
-
-    positions: tuple[int, ...]
-    """Place of each row in the batch."""
-    scores: Scores
+StepScores = tuple[tuple[int, ...], Scores]
+"""Outputs of the networks in one step, after the places in the batch of the episodes that were still running."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +146,7 @@ class HannaPolicy:
             previous_action=percept.actions[taken],
             previous_ask=torch.tensor([REQUEST if ask else DO_NOTHING for ask in asks], device=device),
             last_ask=tuple(o.time if ask else t for ask, o, t in zip(asks, seen, memory.last_ask, strict=True)),
-            moments=(*memory.moments, StepScores(positions, scores)) if self.learns else (),
+            moments=(*memory.moments, (positions, scores)) if self.learns else (),
         )
 
     def scored(self, memory: HannaMemory, percept: Percept) -> tuple[Scores, tuple[Any, Any]]:

@@ -28,7 +28,7 @@ NOTHING = ""
 
 
 def one_request(task: Any, *, rng: np.random.Generator) -> str:
-    """Unif(D*)."""
+    """d* ~ Unif(D*): one of the task's requests."""
     return task.requests[int(rng.integers(len(task.requests)))]
 
 
@@ -53,9 +53,6 @@ class ExecutionScores:
 
 class RequestWorld(Protocol):
     """The world in which requests are fulfilled. Only imitation asks for `demonstrate`, only REINFORCE for `reward`."""
-
-    def request(self, task: Any, *, rng: np.random.Generator) -> str:
-        """d*: one of the task's requests."""
 
     def success(self, task: Any, execution: Any) -> bool:
         """True where the task is fulfilled."""

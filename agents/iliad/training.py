@@ -166,7 +166,7 @@ def successes(world: RequestWorld, student: Student, tasks: Tasks) -> list[bool]
     for at in range(0, len(tasks), BATCH):
         some = tasks[at : at + BATCH]
         rng = np.random.Generator(np.random.PCG64(0))  # held-out tasks have one request: nothing is drawn
-        requests = [world.request(q, rng=rng) for q in some]
+        requests = asked(some, rng)
         good += [world.success(q, e) for q, e in zip(some, student.greedy(some, requests), strict=True)]
     return good
 
@@ -193,9 +193,9 @@ class _Learner:
         set_learning_rate(self.optimizer, c.rate, update, c.iterations, c.cooldown)
         tasks = tasks_of_update(self.problem.training, update, c.batch, c.seed)
         rng = stream(c.seed, "iliad", update)
-        asked = RequestBatch(tasks, [world.request(q, rng=rng) for q in tasks], rng)
+        batch = RequestBatch(tasks, asked(tasks, rng), rng)
         with seeded_dropout(c.seed, update):
-            lesson = self._learn(asked, mixing_at(c, update), sums)
+            lesson = self._learn(batch, mixing_at(c, update), sums)
             descend(lesson.loss, self.optimizer, c.learner, c.clip)
         fulfilled = sum(world.success(q, e) for q, e in zip(tasks, lesson.executions, strict=True))
         loss = float(lesson.loss.detach())

@@ -83,8 +83,9 @@ def regex_setup(args: RegexTraining | RegexStudyOptions) -> RegexSetup:
 
 def nav_setup(args: NavTraining | NavStudyOptions) -> NavSetup:
     from embodied.agents.iliad.nav.run import NavSetup
+    from embodied.agents.vision.encoder import load_encoder
 
-    return NavSetup(args.world, args.data, args.encoder_digest(), args.pictures, args.cache)
+    return NavSetup(args.world, args.data, load_encoder(args.encoder).digest, args.pictures, args.cache)
 
 
 def train(setup_of: Callable[..., Any], args: Any, *, note: Note) -> None:

@@ -18,7 +18,7 @@ from embodied.agents.common.vocabulary import END_NUMBER
 from embodied.agents.hanna.attention import DotAttend, FeedForward, MultiAttend
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent, Track
 from embodied.agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
-from embodied.agents.iliad.protocol import NOTHING, DescribingNetworks
+from embodied.agents.iliad.protocol import NOTHING, DescribingNetworks, one_request
 from embodied.agents.iliad.writing import AttentiveWriter, Bridge, Remembered, before, write
 from embodied.interface import SeenPlace
 from embodied.kinds.metrics import sdtw
@@ -131,7 +131,7 @@ class GrammarNavTeacher:
 
     def _one(self, trip: Trip, walk: NavWalk, *, rng: np.random.Generator) -> str | None:
         if performance(self.world, trip, walk.nodes, trip.path) >= THRESHOLD:
-            return self.world.request(trip, rng=rng)
+            return one_request(trip, rng=rng)
         if len(walk.nodes) < 2:
             return None
         return self.wording(self.places[trip.world], walk.nodes, trip.start.yaw, rng=rng)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from embodied.agents.iliad.protocol import one_request
 from embodied.interface import Place, Pose, Route
 from embodied.navigation.graph import NavGraph, count_hops
 from embodied.teachers.shortest import next_node
@@ -78,8 +77,6 @@ class NavWorld:
 
     def __init__(self, places: Mapping[str, Place]) -> None:
         self.places = places
-
-    request = staticmethod(one_request)
 
     def success(self, task: Trip, execution: NavWalk) -> bool:
         """True where the walk ended within RADIUS of the path's end."""

@@ -46,8 +46,6 @@ class Written:
 class RegexWorld:
     """Requests to change words."""
 
-    request = staticmethod(one_request)
-
     def success(self, task: WordTask, execution: Written) -> bool:
         """True where the episode's word, the first one, became what it should."""
         return execution.outputs is not None and execution.outputs[0] == task.outputs[0]
