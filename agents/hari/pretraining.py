@@ -107,10 +107,12 @@ def train_step(
     config = executor.config
     tasks = tasks_of_update(source.training, update, config.batch, config.seed)
     walks = [_begin(source, t, stream(config.seed, "pretraining", update, i)) for i, t in enumerate(tasks)]
-    if config.subgoals:
-        for walk in walks:
-            if walk.rng.random() < config.subgoals:
-                give_subgoal(walk, source.describer, longest=int(walk.rng.integers(1, LONGEST_SUBGOAL + 1)))
+    for walk in walks if config.subgoals else ():
+        if walk.rng.random() < config.subgoals:  # no farther than to what the assistant would name where it is
+            longest, place = int(walk.rng.integers(1, LONGEST_SUBGOAL + 1)), walk.place
+            goal = walk.task.goal_nodes[0]
+            way, walk.goal = described_subgoal(source.describer, place, walk.pose.node, goal, longest)
+            walk.task = dataclasses.replace(walk.task, goal_nodes=(way[-1],))
     executor.network.train()
     with seeded_dropout(config.seed, update):
         losses, right = _play(executor, source, walks, config.horizon, guided_share(config, update))
@@ -190,12 +192,6 @@ def _begin(source: PretrainingData, task: Task, rng: np.random.Generator) -> Exe
         raise TypeError(f"HARI's tasks ask for objects; task {task.id!r} asks for {task.goal}")
     described = source.describer.pretraining_goal(place, goal, task.start.node, task.goal.object_class, rng=rng)
     return ExecutionWalk(task, place, task.start, described, rng)
-
-
-def give_subgoal(walk: ExecutionWalk, describer: Describer, longest: int = LONGEST_SUBGOAL) -> None:
-    """Let the walk go no farther than to the sub-goal that the assistant would name where it is."""
-    way, walk.goal = described_subgoal(describer, walk.place, walk.pose.node, walk.task.goal_nodes[0], longest)
-    walk.task = dataclasses.replace(walk.task, goal_nodes=(way[-1],))
 
 
 def _right(walk: ExecutionWalk, poses: Sequence[Pose], stop: int) -> int:

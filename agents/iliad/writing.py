@@ -121,16 +121,10 @@ def write(
     return written
 
 
-def log_likelihood(logits: Tensor, written: Tensor) -> Tensor:
-    """(B, T) log p of the numbers written, zero on padding."""
-    present = written != PAD
-    loss = nn.functional.cross_entropy(logits[present], written[present], reduction="none")
-    return torch.zeros(written.shape).masked_scatter(present, -loss)
-
-
 def likelihood_loss(logits: Tensor, written: Tensor) -> Tensor:
     """Negative log-likelihood of the numbers written, averaged over rows."""
-    return -log_likelihood(logits, written).sum() / len(written)
+    present = written != PAD
+    return nn.functional.cross_entropy(logits[present], written[present], reduction="sum") / len(written)
 
 
 def before(written: Tensor, start: int) -> Tensor:

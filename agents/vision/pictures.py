@@ -125,7 +125,8 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
         known = self._known[house]
         yaw, pitch = (float(VIEW_YAWS[k]), float(VIEW_PITCHES[k])) if self._each > 1 else (0.0, 0.0)
         pictures = self._seen(house, node, yaw, pitch, self._camera_of(item))
-        out = {name: torch.from_numpy(_colours_first(name, a)) for name, a in pictures.items()}
+        colours_first = lambda name, a: np.moveaxis(a, -1, -3) if name == "rgb" else a
+        out = {n: torch.from_numpy(np.ascontiguousarray(colours_first(n, a))) for n, a in pictures.items()}
         if "ids" in pictures:
             out["visible"] = torch.from_numpy(_visible(pictures["ids"], known.class_of_id, len(self.classes)))
         pose = np.array([*known.positions[node], yaw, pitch], np.float32)
@@ -162,11 +163,6 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
 def _opened(path: Path, changed: int, process: int) -> PanoramaFile:
     """The panoramas of a file that was last changed then, opened by a process: what is forked opens it anew."""
     return PanoramaFile(path)
-
-
-def _colours_first(name: str, picture: np.ndarray) -> np.ndarray:
-    """(..., h, w, 3) -> (..., 3, h, w) for 'rgb'; others as they are, in one piece of memory that can be written."""
-    return np.ascontiguousarray(np.moveaxis(picture, -1, -3) if name == "rgb" else picture)
 
 
 def _visible(ids: np.ndarray, class_of_id: np.ndarray, classes: int) -> np.ndarray:
