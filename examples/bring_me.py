@@ -126,8 +126,9 @@ def hidden_or_not(env: RobotEnv, rng: np.random.Generator) -> RobotGoal | None:
 
 
 def handed(env: Any) -> bool:
-    """True where the thing is with the person."""
-    return math.dist(env.body.thing(env.goal.thing)[:2], env.person) <= HANDED
+    """True where the robot has the thing, and brought it to the person."""
+    thing = env.goal.thing
+    return thing in (env.body.held, *env.body.met) and math.dist(env.body.thing(thing)[:2], env.person) <= HANDED
 
 
 ROBOT_TASKS["bring"] = ("bring me the {}", hidden_or_not, handed)

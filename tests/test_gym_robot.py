@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from absl.testing import absltest
 from conftest import two_rooms
+from dm_env import test_utils
 from gymnasium.utils.env_checker import check_env
 from handmade import HandCatalogue, furnished
 
@@ -107,3 +110,15 @@ def test_wishes_of_robots_that_cannot_be_had_are_refused(world):
     env.reset(seed=0)
     with pytest.raises(ValueError, match="finite numbers"):
         env.step(np.full(env.action_space.shape, np.nan))
+
+
+class TestDmEnv(test_utils.EnvironmentTestMixin, absltest.TestCase):
+    """dm_env's own tests of the environment that examples/as_dm_env.py makes of it."""
+
+    def make_object_under_test(self):
+        world = open_world(furnished(two_rooms()), HandCatalogue(), Path(tempfile.mkdtemp()), size=32)
+        return example("as_dm_env.py").DmEnv(RobotEnv({world.name: world}, RobotSettings(**SMALL, seconds=0.5)))
+
+    def make_action_sequence(self):
+        spec = self.environment.action_spec()
+        return [np.full(spec.shape, 0.1, spec.dtype)] * 8
