@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.parametric import BuildRequest, FinishedShapes, parts_of, plain, whole_image
+from embodied.assets.built.parametric import CLOTHS, BuildRequest, FinishedShapes, parts_of, plain, whole_image
 from embodied.assets.built.primitives import (
     Shape,
     ball,
@@ -23,20 +23,6 @@ from embodied.assets.built.primitives import (
 )
 from embodied.assets.records import MeshPart
 
-CLOTH = (
-    (0.55, 0.16, 0.14),
-    (0.14, 0.22, 0.34),
-    (0.20, 0.32, 0.26),
-    (0.75, 0.62, 0.38),
-    (0.85, 0.83, 0.77),
-    (0.12, 0.12, 0.13),
-    (0.42, 0.30, 0.22),
-    (0.66, 0.36, 0.24),
-    (0.36, 0.44, 0.50),
-    (0.58, 0.56, 0.50),
-    (0.35, 0.16, 0.22),
-    (0.80, 0.78, 0.74),
-)
 PALE = 1.35
 """Sum of a cloth's channels from which on it is printed dark."""
 
@@ -89,7 +75,7 @@ def _on_front(w: float, d: float, h: float, *, rng: np.random.Generator) -> Shap
 
 def _ink(cloth: int) -> str:
     """Gilt on dark cloth, dark print on light cloth."""
-    return "ink" if sum(CLOTH[cloth]) > PALE else "gilt"
+    return "ink" if sum(CLOTHS[cloth]) > PALE else "gilt"
 
 
 def book_row(spec: BuildRequest) -> list[MeshPart]:
@@ -100,7 +86,7 @@ def book_row(spec: BuildRequest) -> list[MeshPart]:
     pages, bands = [], []
     (prints,) = rng.spawn(1)
     x = -w / 2
-    palette = rng.permutation(len(CLOTH))[: int(rng.integers(5, 10))]
+    palette = rng.permutation(len(CLOTHS))[: int(rng.integers(5, 10))]
     first = True
     while True:
         t = float(np.clip(rng.lognormal(-3.6, 0.45), 0.012, 0.06))
@@ -119,7 +105,7 @@ def book_row(spec: BuildRequest) -> list[MeshPart]:
         if x > w / 2 - 0.012:
             break
     return parts_of(
-        *((plain(CLOTH[k], 0.75, specular=0.25), s) for k, s in sorted(by_color.items())),
+        *((plain(CLOTHS[k], 0.75, specular=0.25), s) for k, s in sorted(by_color.items())),
         ("paper", pages),
         ("gilt", bands),
         *titles.items(),
@@ -134,7 +120,7 @@ def book_stack(spec: BuildRequest) -> list[MeshPart]:
     covers: list[FinishedShapes] = []
     z, pages = 0.0, []
     (prints,) = rng.spawn(1)
-    colours = rng.permutation(len(CLOTH))
+    colours = rng.permutation(len(CLOTHS))
     for k, t in enumerate(heights / heights.sum() * h):
         shrink = 1.0 - 0.06 * k
         inner = t, d * 0.94 * shrink, w * 0.94 * shrink
@@ -147,8 +133,8 @@ def book_stack(spec: BuildRequest) -> list[MeshPart]:
             s.turned(np.pi / 2, "y").moved(-w * 0.47 * shrink, 0, t / 2).turned(angle).moved(0, 0, z)
             for s in (cover, leaves, print_)
         ]
-        cloth = int(colours[k % len(CLOTH)])
-        covers += [(plain(CLOTH[cloth], 0.6, specular=0.3), place[0]), (_ink(cloth), place[2])]
+        cloth = int(colours[k % len(CLOTHS)])
+        covers += [(plain(CLOTHS[cloth], 0.6, specular=0.3), place[0]), (_ink(cloth), place[2])]
         pages.append(place[1])
         z += t
     return parts_of(*covers, ("paper", pages))

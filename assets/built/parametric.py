@@ -28,10 +28,12 @@ class _BuiltFinishes:
     finishes: Mapping[str, Finish]
     tints: Mapping[str, Color]
     lights: Mapping[str, Color]
+    cloths: tuple[Color, ...]
+    """Of covers of books."""
 
 
 _READ = from_plain(_BuiltFinishes, read_toml(Path(__file__).with_name("finishes.toml")))
-PLAIN, TINTS, LIGHTS = _READ.finishes, _READ.tints, _READ.lights
+PLAIN, TINTS, LIGHTS, CLOTHS = _READ.finishes, _READ.tints, _READ.lights, _READ.cloths
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ import io
 import json
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -504,14 +504,9 @@ def _matrix(node: dict[str, Any]) -> np.ndarray:
 def _joined(parts: list[RawPart]) -> RawPart:
     """Parts that look alike as one."""
     first = np.cumsum([0, *(len(p.vertices) for p in parts)])
-    one = parts[0]
-    return RawPart(
-        one.name,
-        np.concatenate([p.vertices for p in parts]),
-        np.concatenate([p.faces + k for p, k in zip(parts, first)]),
-        None if one.uv is None else np.concatenate([p.uv for p in parts if p.uv is not None]),
-        one.finish,
-        one.image,
-        two_sided=one.two_sided,
-        least=one.least,
+    return replace(
+        parts[0],
+        vertices=np.concatenate([p.vertices for p in parts]),
+        faces=np.concatenate([p.faces + k for p, k in zip(parts, first)]),
+        uv=None if parts[0].uv is None else np.concatenate([p.uv for p in parts if p.uv is not None]),
     )

@@ -72,7 +72,9 @@ def _check_placement(house: House, p: Placement, catalogue: Catalogue) -> None:
             f"object {p.id!r} is called a {p.object_class!r}, its asset {p.asset!r} is a {asset.object_class!r}"
         )
     if p.surface is not None:
-        names = _surfaces(house, p, catalogue)
+        parent = house.placement_by_id.get(p.parent or "")
+        below = catalogue.assets.get(parent.asset) if parent is not None else None
+        names = [s.name for s in below.surfaces] if below is not None else []
         if p.surface not in names:
             raise HouseError(
                 f"object {p.id!r} lies on the unknown surface {p.surface!r} of {p.parent!r}, which has {names}; "
@@ -96,13 +98,6 @@ def _check_placement(house: House, p: Placement, catalogue: Catalogue) -> None:
             raise HouseError(f"object {p.id!r} has {name}={value!r}; a value like {known[name]!r} is wanted")
         if isinstance(value, str) and known[name] in MATERIALS:
             _check_material(f"object {p.id!r}", value)
-
-
-def _surfaces(house: House, p: Placement, catalogue: Catalogue) -> list[str]:
-    """Names of the surfaces of what `p` rests on; the parent's asset may be unknown too."""
-    parent = house.placement_by_id.get(p.parent) if p.parent is not None else None
-    below = catalogue.assets.get(parent.asset) if parent is not None else None
-    return [s.name for s in below.surfaces] if below is not None else []
 
 
 def _near(word: str, known: Iterable[str]) -> str:
