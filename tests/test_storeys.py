@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import json
 from types import SimpleNamespace
@@ -10,12 +11,14 @@ import mujoco
 import numpy as np
 import pytest
 import shapely
+from PIL import ImageChops
 
 from embodied.assets.catalogue import load_catalogue
 from embodied.envs.continuous import ContinuousEnv, ContinuousEpisode, NavigationGoal, ShortestPathFollower
 from embodied.generate import STAGES, HouseConfig, generate_house
 from embodied.generate.plan_file import house_of_plan, load_plan
 from embodied.generate.stairwell import fitting
+from embodied.house.floor_plan import paint_plan
 from embodied.house.house import House, HouseError
 from embodied.house.shapes import footprint, room_at, well_of
 from embodied.language.clauses import DOWN, UP, Climb
@@ -113,6 +116,11 @@ def test_one_stands_on_every_tread_and_nobody_falls_from_an_edge(house):
             inward = np.array(well.centroid.coords[0]) - p
             inward = np.append(inward / np.linalg.norm(inward), 0.0)
             assert 0 <= ray(np.append(p, z + 0.5) - 0.3 * inward, inward) < 0.6, "an edge without a railing"
+
+
+def test_the_plan_of_an_upper_floor_shows_its_furniture(house):
+    bare = dataclasses.replace(house, placements=())
+    assert ImageChops.difference(paint_plan(house, storey=1), paint_plan(bare, storey=1)).getbbox()
 
 
 def test_viewpoints_lie_on_the_stairs_and_come_back_from_matterports_file(house, tmp_path):

@@ -170,7 +170,8 @@ class _Site:
             if math.dist(p.position[:2], eye) < 2 * FARTHEST_PERSON
         ]
         self.open = house.floor(room).intersection(around)
-        self.things = [p for p in house.placements if p.room == room.id and p.position[2] < 1.8 and p.size[2] > 0.05]
+        low = self.floor + 1.8
+        self.things = [p for p in house.placements if p.room == room.id and p.position[2] < low and p.size[2] > 0.05]
         """Things that a body would run into: below head height, and higher than a rug."""
         doors = [o for o in house.openings if o.kind == "door" and o.rooms[0] == room.id]
         self.leaves = [leaf for o in doors for leaf in leaves(house, o)]

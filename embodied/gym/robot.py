@@ -111,7 +111,7 @@ class RobotEnv(LiveEnv):
             self._furnish(spec)
             placed = place(spec, s.robot, rolling=s.actions == "base")
             body = RobotBody(self.world.house, spec, placed, hand=s.hand, assisted=s.grasp == "assisted")
-            self._bodies[name] = body, FloorWays(self.world.house)
+            self._bodies[name] = body, FloorWays(self.world.house, stairs=False)
         self.body, self.ground = self._bodies[name]
 
     def _furnish(self, spec: mujoco.MjSpec) -> None:

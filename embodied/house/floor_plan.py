@@ -236,7 +236,8 @@ def _arc(
 
 def _draw_furniture(sheet: _Sheet, house: House, ids: set[str]) -> None:
     """Footprints from low to high; floor coverings pale, small things tiny."""
-    things = [p for p in house.placements if p.room in ids and p.position[2] < 1.7]
+    high = {r: house.storey_of(house.room_by_id[r]).elevation + 1.7 for r in ids}
+    things = [p for p in house.placements if p.room in ids and p.position[2] < high[p.room]]
     for p in sorted(things, key=lambda p: (p.position[2] + p.size[2], p.id)):
         corners = rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw)
         if p.object_class == "person":
@@ -377,7 +378,8 @@ def _label(sheet: _Sheet, house: House, room: Room) -> None:
 
 def _calm_spot(house: House, room: Room, inside: shapely.Polygon) -> tuple[float, float]:
     """Near the middle, but off furniture where the room leaves a choice."""
-    low = (p for p in house.placements if p.room == room.id and p.size[2] > 0.04 and p.position[2] < 1.7)
+    high = house.storey_of(room).elevation + 1.7
+    low = (p for p in house.placements if p.room == room.id and p.size[2] > 0.04 and p.position[2] < high)
     things = shapely.union_all([footprint(p) for p in low])
     x0, y0, x1, y1 = inside.bounds
     best, least = ((x0 + x1) / 2, (y0 + y1) / 2), math.inf
