@@ -102,7 +102,7 @@ def neckline(w: Wearer, high: float, depth: float = 0.0, slope: float = 1.6) -> 
 
     def field(x: Layer) -> np.ndarray:
         p = x.place
-        ring = (z0 + high * w.scale + 0.75 * (p[:, 1] - y0)) - p[:, 2]
+        ring = (z0 + high * (1.35 - 0.35 * w.scale) + 0.75 * (p[:, 1] - y0)) - p[:, 2]
         vee = z0 - depth + slope * np.abs(p[:, 0] - x0) - p[:, 2]
         return np.minimum(ring, np.where(p[:, 1] < y0 + 0.01, vee, 1.0)) if depth else ring
 
