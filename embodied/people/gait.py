@@ -240,7 +240,7 @@ def sitting(limbs: Limbs, begin: Bearing, seat: np.ndarray, heading: float, shar
         feet.append(foot + (end - foot) * u + [0, 0, 0.06 * leg * math.sin(math.pi * u), 0, 0])
     lean = 0.35 * math.sin(math.pi * down)
     turns = {**begin.turns, "pelvis": np.array([lean - 0.15 * down, 0, 0]), "chest": np.array([lean, 0, 0])}
-    at = begin.position + (below - begin.position) * goes
+    at = begin.position * (1 - goes) ** 2 + (below + knee) * 2 * goes * (1 - goes) + below * goes**2
     return Bearing(at, begin.heading + by * goes, tuple(feet), down * lift, turns)
 
 
