@@ -22,7 +22,7 @@ OURS = "embodied"
 ROOT = Path(str(sys.modules[OURS].__file__)).resolve().parent.parent
 BESIDE = ("agents", "assets", "viz")
 """Parts of it that lie beside its folder in a clone, and inside it where a wheel installed them."""
-INDIFFERENT = frozenset({"tqdm", "joblib", "numba", "OpenGL", "gymnasium", "rerun", "psutil"})
+INDIFFERENT = frozenset({"tqdm", "joblib", "numba", "OpenGL", "gymnasium", "rerun", "psutil", "mujoco_menagerie"})
 """Libraries that decide no byte of any product: they show, spread, hasten or hand on what others make."""
 
 
