@@ -83,7 +83,7 @@ def worded(
                 text = language.route(world, path, turn * 2 * math.pi / TURNS, rng=rng)
                 if text not in used:
                     break
-            used.add(text)
             if text:
+                used.add(text)
                 routes.append(Route(f"{world.house.name}_{p}_{k}", path, turn, 0, text, split))
     return tuple(routes)
