@@ -207,6 +207,12 @@ def test_lit_pages_replace_the_materials(house):
     assert s.model.ngeom == 1 and s.owners[s.owner_of_geom[0] - 1] == "rug_1" and s.room_of_geom == ("living_room_1",)
 
 
+def test_people_are_seen_from_inside_where_their_models_have_gaps(house):
+    count = lambda h: scene.compile_scene(h, HandCatalogue(), collisions=False, lit=lit_rug()).model.nmeshface
+    person = [dataclasses.replace(p, object_class="person") if p.id == "rug_1" else p for p in house.placements]
+    assert (count(house), count(dataclasses.replace(house, placements=tuple(person)))) == (2, 4)
+
+
 def test_light_of_another_house_is_refused(house):
     pages = LitPages((), (), "x", owners=("somebody_else",))
     with pytest.raises(ValueError, match="another house"):

@@ -24,7 +24,6 @@ from embodied.assets.records import Finish, MeshPart
 PACK = Path(__file__).with_name("data")
 UNIT, UV_UNIT = 1 / 8192, 1 / 4096
 """Steps of stored coordinates: metres, and texture coordinates."""
-DETAILS_OF_BODIES = 3
 FIGURE_SEAT = 0.45
 """Height of the seat that sitting figures are made for, metres."""
 STILL = dict.fromkeys(("standing", "waiting", "talking", "leaning"), "standing") | {"sitting": "sitting"}
@@ -111,7 +110,7 @@ def posed(
       detail: 0 for looking at a person from nearby, 1 from 3 m on, 2 from 6 m on.
       finish: gives the finish of a material; from the user's cache folder if None.
     """
-    if detail not in range(DETAILS_OF_BODIES):
+    if detail not in range(3):
         raise ValueError(f"detail should be 0, 1 or 2, got {detail!r}")
     mesh = mesh_of(person.id, detail)
     turns = transforms(person, pose)

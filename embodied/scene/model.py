@@ -61,6 +61,9 @@ SMALL = 0.5
 """Longest side of what a hand can take, metres."""
 LEAVES = ("/leaf", "/leaf_2", "/glass")
 """Ends of the owners of what closes an opening."""
+HOLLOW = ("person",)
+"""Classes whose models are shells with gaps, through which one would see what stands behind them. Drawn from both sides
+here instead of by `two_sided` of their import, which would double what is baked of them."""
 YIELDING = ("curtain",)
 """Classes that give way to doors on hinges."""
 UNDERFOOT = 0.03
@@ -468,11 +471,15 @@ def _unturned(vertices: np.ndarray, yaw: float) -> np.ndarray:
 
 
 def drawn_meshes(lit: LitPages, house: House) -> Iterator[tuple[int, LitMesh]]:
-    """The meshes of a lit house as they are drawn, each with its number in LitPages.meshes: what stands around the
-    house in pieces, of which a window shows few."""
+    """The meshes of a lit house as they are drawn, each with its number in LitPages.meshes: those of HOLLOW things
+    seen from inside, too; what stands around the house in pieces, of which a window shows few."""
+    hollow = {p.id for p in house.placements if p.object_class in HOLLOW}
     low, high = bounds_of(house)
     for i, mesh in enumerate(lit.meshes):
         for vertices, uv, faces in _pieces(mesh, (low + high) / 2):
+            if mesh.owner in hollow:
+                faces = np.concatenate([faces, faces[:, ::-1] + len(vertices)])
+                vertices, uv = np.concatenate([vertices, vertices]), np.concatenate([uv, uv])
             yield i, dataclasses.replace(mesh, vertices=vertices, uv=uv, faces=faces)
 
 
