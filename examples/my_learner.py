@@ -18,7 +18,7 @@ import embodied
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common.weights import load_weights, save_weights
 from embodied.agents.learner import Learner, Players, PlaySettings
-from embodied.agents.options import Encoded, Limited, Repeated, StudyOptions, WithData, study_of, training_data
+from embodied.agents.options import Encoded, Repeated, StudyOptions, WithData, study_of, training_data
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.vision.sighted_study import FeatureStudy, TrainingData, evaluation_data
 from embodied.interface import Actions, FeatureSource, Move, Observation, Observations, Rngs, Sight, Stop
@@ -98,7 +98,7 @@ class RidgeTraining(WithData, Encoded):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RidgeStudyOptions(StudyOptions, Repeated, Limited, WithData, Encoded):
+class RidgeStudyOptions(StudyOptions, Repeated, WithData, Encoded):
     """Agents that find things, by how much they learned from."""
 
     config: Config
