@@ -359,7 +359,8 @@ def answers_of_people(folder: Path, data: Dataset) -> Kind:
             store.close()
 
     store = Store(folder / "people.db")
-    store._write([Event("came", 1.0, body={"a": "b"}) for _ in range(200)])
+    for _ in range(200):
+        store._write(Event("came", 1.0, body={"a": "b"}))
     store.close()
     return Kind(folder / "people.db", read, lenient=True)
 

@@ -129,6 +129,7 @@ REVIEWED = {
     "assets/cache.py": "drafts, which are marked",
     "embodied/cli/cache.py": "what it was asked to, of the kinds that the program keeps in a cache",
     "agents/bandit/corpus.py": "the mark of a whole corpus, before it writes another",
+    "embodied/cli/serve.py": "its own links, before it writes them anew",
     "embodied/locks.py": "its own lock",
     "embodied/datasets/lerobot.py": "an empty folder",
     "embodied/light/baking/house.py": "a bake in the cache",
