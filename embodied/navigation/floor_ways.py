@@ -136,9 +136,12 @@ class FloorWays:
         """The shortest ways from everywhere to the nearest of some cells, an array of their indices, at least one."""
         return self._ways(self._steps, goals)
 
-    def wide_ways(self, goals: np.ndarray) -> DrivingWays:
-        """Ways that keep away from things where there is room for that; their metres are longer than they are."""
-        return self._ways(self._wide, goals)
+    def wide_ways(self, goals: np.ndarray, shut: np.ndarray | None = None) -> DrivingWays:
+        """Ways that keep away from things where there is room for that, and out of the cells that are `shut`, (n,)
+        bool; their metres are longer than they are."""
+        steps = self._wide if shut is None else self._wide.multiply(~shut[:, None]).multiply(~shut).tocsr()
+        steps.eliminate_zeros()
+        return self._ways(steps, goals)
 
     def _ways(self, steps: csr_matrix, goals: np.ndarray) -> DrivingWays:
         metres, after, _ = dijkstra(
