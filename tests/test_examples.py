@@ -53,6 +53,13 @@ def test_generate_and_look_writes_a_plan_and_pictures(run, tmp_path):
     assert {p.name for p in (tmp_path / "look").iterdir()} >= {"house.json", "plan.png"}
 
 
+def test_the_day_of_a_household_begins_and_ends_in_bed(run):
+    told = run("household_day.py", "--seed", "7")
+    for person in told.split(", man ")[1:] + told.split(", woman ")[1:]:
+        hours = re.findall(r"^  (\d\d:\d\d) (\w+)", person.partition("\nadult")[0], re.M)
+        assert hours == sorted(hours) and hours[0][1] == hours[-1][1] == "sleeping" and len(hours) > 8
+
+
 @pytest.mark.gl
 @pytest.mark.slow
 def test_the_gymnasium_loop_hears_help(run):
