@@ -66,8 +66,9 @@ def boxes_house(seed, name, config, catalogue):
 
 def live_among_boxes(monkeypatch) -> None:
     """Let commands and examples find `boxes_house` wherever they would generate one, and its catalogue."""
-    monkeypatch.setattr("embodied.datasets.build.make_dataset_house", boxes_house)
-    for module in ("assets.catalogue", "datasets.build", "gym.drive"):
+    for module in ("gym.playground", "datasets.build"):  # the first one takes its names from the second
+        monkeypatch.setattr(f"embodied.{module}.make_dataset_house", boxes_house)
+    for module in ("gym.playground", "assets.catalogue", "datasets.build", "gym.drive"):
         monkeypatch.setattr(f"embodied.{module}.load_catalogue", lambda *_, **__: HandCatalogue())
 
 
