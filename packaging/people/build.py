@@ -203,16 +203,15 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=PACK)
     options = parser.parse_args()
     rows = tomllib.loads(Path(__file__).with_name("people.toml").read_text())
-    records, whole = {}, {}
+    records = {}
     options.out.mkdir(exist_ok=True)
     for name in options.names or rows:
         record, own, pictures = person(name, rows[name])
         records[name] = record
-        whole |= {f"{name}/{field}": value for field, value in own.items()}
+        np.savez_compressed(options.out / f"{name}.npz", **own)
         for file, picture in pictures.items():
             cv2.imwrite(str(options.out / file), picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         print(name, {d: len(own[f"faces{d}"]) for d in range(len(COARSER))}, len(own["vertices"]))
-    np.savez_compressed(options.out / "people.npz", **whole)
     for record in records.values():
         record["sizes"] = dict.fromkeys(STILL, [1.0, 1.0, 1.0, 0.0])
     path = options.out / "people.json"
