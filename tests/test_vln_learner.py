@@ -120,3 +120,11 @@ def test_the_shipped_follower_learned_from_the_shipped_encoder():
     assert SHIPPED_VLN.stat().st_size < 4e6
     assert agent.about.encoder == load_encoder(SHIPPED_ENCODER).digest
     assert len(agent.vocabulary) > 900 and not agent.about.config.blind
+
+
+def test_a_text_is_read_from_its_end_and_its_own_end_stays_where_it_is_too_long():
+    words = build_vocabulary(["a b c d"])
+    number, end = words.number, words.number("<EOS>")
+    assert list(words.encode("a b", 4, backwards=True)) == [number("b"), number("a"), end, 0]
+    assert list(words.encode("a b c d", 3, backwards=True)) == [number("b"), number("a"), end]
+    assert list(words.encode("a b c d", 3)) == [number("a"), number("b"), number("c")], "and the same text as it is"

@@ -16,7 +16,7 @@ from embodied.agents.common import imitation
 from embodied.agents.common.imitation import play_with_memory
 from embodied.agents.common.weights import CheckpointError
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vnla.agent import ASKED, LEARNED, TEACHER, VnlaAgent, rules_of
+from embodied.agents.vnla.agent import ASKED, LEARNED, TEACHER, VnlaAgent
 from embodied.agents.vnla.config import TRAINED_UNDER
 from embodied.agents.vnla.looking import READING, lessons_of, turned
 from embodied.agents.vnla.network import ASK, DONT, MOST_LEFT, NO_ASK, NO_MOVE, STOP, VnlaPercept
@@ -27,7 +27,7 @@ from embodied.envs.vnla import RULES_OF_PLAY
 from embodied.evaluation.evaluate import play
 from embodied.interface import Ask
 from embodied.records import identity_of
-from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason
+from embodied.teachers.vnla import VnlaTeacher, ask_reason
 
 quiet = lambda line: None
 identity = lambda agent: identity_of(settings=agent.config, pictures=agent.about.pictures)
@@ -114,7 +114,7 @@ def test_the_losses_are_two_cross_entropies_by_hand():
 
 def moments(config=TINY):
     agent, training, _ = lesson(config)
-    teacher = VnlaTeacher(rules=rules_of(config))
+    teacher = VnlaTeacher()
     player = for_training(agent.policy(training.bank), teacher)
     return training, *play_with_memory(training.make_env, player, training.tasks[:8], seed=3)
 
@@ -140,13 +140,6 @@ def test_what_an_advisor_did_in_its_place_is_what_it_knows_to_have_done():
             if not isinstance(step.action, Ask):
                 assert carried_out(before, after) == step.action.candidate
             before = after
-
-
-@pytest.mark.slow
-def test_rules_of_the_teacher_can_be_left_out():
-    assert rules_of(dataclasses.replace(TINY, ask_rules="b to d")) == AskRules(only=("uncertain", "unmoved", "remain"))
-    _, episodes, memory = moments(dataclasses.replace(TINY, ask_rules="a and e"))
-    assert int(torch.cat([m.ask_labels for m in memory.moments]).sum()) == sum(e.requests for e in episodes)
 
 
 # Acting ------------------------------------------------------------------------------------------
@@ -246,7 +239,7 @@ def test_an_agent_comes_back_from_its_file(tmp_path):
 
 
 def test_settings_refuse_what_they_cannot_be():
-    for wrong in ({"asker": "every5"}, {"rules": "Algorithm 6"}, {"ask_rules": "a"}):
+    for wrong in ({"asker": "every5"}, {"rules": "Algorithm 6"}):
         with pytest.raises(ValueError, match=next(iter(wrong))):
             dataclasses.replace(TINY, **wrong)
     assert set(TRAINED_UNDER) == set(RULES_OF_PLAY) and DONT != ASK

@@ -31,7 +31,7 @@ from embodied.agents.common.session import (
     tasks_of_update,
 )
 from embodied.agents.common.settings import MAY_CHANGE, EvaluationSettings, ImitationSettings
-from embodied.agents.common.vocabulary import Vocabulary, use_vectors, vocabulary_with
+from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.common.weights import half_precision, load_into, load_weights, save_weights, seeded
 from embodied.envs.base import HelpEnv
 from embodied.errors import UnableError
@@ -89,9 +89,7 @@ class SightedAgent:
     def new(cls, about: About) -> Self:
         """An untrained agent; its weights follow from the seed."""
         with seeded(about.config.seed):
-            network, vocabulary = cls.network_of(about), vocabulary_with(about.words, about.config.word_vectors)
-            use_vectors(network, vocabulary)
-            return cls(about, network, vocabulary)
+            return cls(about, cls.network_of(about), Vocabulary(about.words))
 
     def save(self, path: Path, identity: Identity | None = None) -> None:
         """Write weights in half precision, with settings, words and what it was trained with, atomically."""

@@ -27,8 +27,6 @@ NOT_NEGATIVE = Limit(lambda x: 0 <= x < math.inf, "at least 0 and finite")
 POSITIVE = Limit(lambda x: 0 < x < math.inf, "positive and finite")
 SHARE = Limit(lambda x: 0 <= x <= 1, "in [0, 1]")
 NOT_ALL = Limit(lambda x: 0 <= x < 1, "in [0, 1)")
-LEARNED_WORDS = "learned"
-WORD_VECTORS = (LEARNED_WORDS, "minilm")
 
 
 def require(settings: object, limit: Limit, *names: str) -> None:
@@ -103,8 +101,6 @@ class ImitationSettings(ValidatedRunSettings):
     """Share of feature channels hidden for a whole training episode (Tan et al. 2019; docs/sources.md, S35, S113)."""
     instruction_length: int = 50
     """Longest instruction, words."""
-    word_vectors: str = LEARNED_WORDS
-    """Word embeddings: 'learned', or 'minilm', pre-trained vectors in addition (docs/sources.md, S181)."""
     validation_tasks: int = 200
     """Tasks of each validation."""
 
@@ -114,7 +110,6 @@ class ImitationSettings(ValidatedRunSettings):
         require(self, NOT_NEGATIVE, "weight_decay", "training_houses")
         require(self, NOT_ALL, "environment_dropout")
         require(self, SHARE, "cooldown")
-        require_word(self, "word_vectors", WORD_VECTORS)
 
 
 MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes")

@@ -21,7 +21,6 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from embodied.agents.common.tensors import Rows
-from embodied.agents.common.vocabulary import WordEmbedding
 from embodied.interface import Move, Observation, Open, Stop
 
 VIEWS = 36
@@ -276,7 +275,7 @@ class TextEncoder(nn.Module):
     def __init__(self, words: int, hidden: int, heads: int, dropout: float) -> None:
         super().__init__()
         self.hidden = hidden
-        self.embedding = WordEmbedding(words, hidden)
+        self.embedding = nn.Embedding(words, hidden, padding_idx=0)
         nn.init.normal_(self.embedding.weight, std=hidden**-0.5)
         self.attend = MultiAttend(hidden, heads, dropout)
         self.feed = FeedForward(hidden, dropout)

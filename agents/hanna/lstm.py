@@ -12,7 +12,6 @@ import torch
 from torch import Tensor, nn
 
 from embodied.agents.common.tensors import Rows
-from embodied.agents.common.vocabulary import WordEmbedding
 from embodied.agents.hanna.attention import SLOTS, VIEWS, DotAttend, Percept, action_size
 from embodied.agents.hanna.network import AgentNetwork
 from embodied.agents.hanna.training_config import TrainingConfig
@@ -39,7 +38,7 @@ class LstmStateNetwork(nn.Module):
         super().__init__()
         h, d = config.hidden_size, feature_size
         self.hidden_size = h
-        self.embedding = WordEmbedding(words, h)
+        self.embedding = nn.Embedding(words, h, padding_idx=0)
         self.text_lstm = nn.LSTM(h, h, batch_first=True)
         self.scene_attend = DotAttend(h, d, h)
         self.decoder = nn.LSTMCell(previous_size + d + VIEWS + extra_size, h)

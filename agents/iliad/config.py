@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 
 from embodied.agents.common.settings import (
     AT_LEAST_ONE,
-    LEARNED_WORDS,
     NOT_ALL,
     NOT_NEGATIVE,
     POSITIVE,
     SHARE,
-    WORD_VECTORS,
     Limit,
     RunSettings,
     require,
@@ -193,12 +191,9 @@ class NavConfig(TeacherConfig):
     """Ablation without vision: all features are zero to the student."""
     more_paths: int = 0
     """Additional paths per training house, each worded three times."""
-    word_vectors: str = LEARNED_WORDS
-    """Word embeddings: 'learned', or 'minilm', pre-trained vectors in addition."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_word(self, "word_vectors", WORD_VECTORS)
         require(self, AT_LEAST_ONE, "heads")
         require(self, NOT_NEGATIVE, "more_paths", "progress_weight", "room_weight")
         require(self, NOT_ALL, "dropout", "environment_dropout")

@@ -10,9 +10,6 @@ from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import TRAINING, Encoded, Repeated, StudyOptions, WithData, study_by
 from embodied.options import Count, Settings
 
-WORDLESS = ("instruction_length", "word_vectors")
-"""Of the settings of agents, those that an agent that is told a class has no use for."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class FindStudyOptions(StudyOptions, Repeated, WithData, Encoded):
@@ -20,7 +17,7 @@ class FindStudyOptions(StudyOptions, Repeated, WithData, Encoded):
 
     house_tasks: Count = 50
     """Evaluate on at most N tasks of each unseen house."""
-    config: Annotated[FinderConfig, Settings(TRAINING, FinderConfig(), skip=WORDLESS)]
+    config: Annotated[FinderConfig, Settings(TRAINING, FinderConfig(), skip=("instruction_length",))]
 
 
 register_learner(Learner(name="find", study=(FindStudyOptions, study_by("embodied.agents.find.study:FindStudy"))))

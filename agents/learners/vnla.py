@@ -19,7 +19,7 @@ from embodied.agents.options import (
     study_by,
     training,
 )
-from embodied.agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VNLA_SCALES, VnlaSettings
+from embodied.agents.vnla.config import ASKERS, TRAINED_UNDER, VNLA_SCALES, VnlaSettings
 from embodied.options import Count, Settings
 
 if TYPE_CHECKING:
@@ -35,10 +35,7 @@ class VnlaTraining(SightedRun):
 
     threads: Count = 2
     config: Annotated[
-        VnlaSettings,
-        Settings(
-            TRAINING, VNLA_SCALES, words={"asker": ASKERS, "ask_rules": tuple(ASK_RULES), "rules": tuple(TRAINED_UNDER)}
-        ),
+        VnlaSettings, Settings(TRAINING, VNLA_SCALES, words={"asker": ASKERS, "rules": tuple(TRAINED_UNDER)})
     ]
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
 
@@ -48,10 +45,10 @@ class VnlaStudyOptions(EpisodeStudyOptions, Encoded):
     """Agents that ask an advisor within a budget."""
 
     tables: Tables
-    """Make these tables: askers, interventions, algorithm-6 or rules."""
+    """Make this table: askers."""
     others: Count | None = None
     """Training seeds of all rows but the learned asker's (default: --seeds)."""
-    config: Annotated[VnlaSettings, Settings(TRAINING, VNLA_SCALES, skip=("asker", "ask_rules", "rules"))]
+    config: Annotated[VnlaSettings, Settings(TRAINING, VNLA_SCALES, skip=("asker", "rules"))]
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
 
 

@@ -25,7 +25,7 @@ from embodied.agents.common.tensors import (
     choose_greedily,
     hidden_channels,
 )
-from embodied.agents.common.vocabulary import Vocabulary, WordEmbedding
+from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.common.weights import check_features
 from embodied.agents.hanna.attention import DotAttend, action_index, candidate_rows, orientation
 from embodied.agents.vision.features import FeatureBank
@@ -102,7 +102,7 @@ class FollowerNetwork(nn.Module):
     def __init__(self, config: FollowerSettings, words: int, features: int) -> None:
         super().__init__()
         h, size = config.hidden_size, features + 4 * COPIES
-        self.embed, self.dropout = WordEmbedding(words, h), nn.Dropout(config.dropout)
+        self.embed, self.dropout = nn.Embedding(words, h, padding_idx=0), nn.Dropout(config.dropout)
         self.read = nn.LSTM(h, h // 2, batch_first=True, bidirectional=True)
         self.begins = nn.Linear(h, 2 * h)
         self.look, self.stand = DotAttend(h, size, h), DotAttend(h, size, h)

@@ -9,7 +9,7 @@ from embodied.agents.common.imitation import About, SightedAgent, Supervised
 from embodied.agents.common.tensors import choose_at
 from embodied.agents.common.weights import check_features
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vnla.config import ASK_RULES, VnlaSettings
+from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.network import VnlaNetwork
 from embodied.agents.vnla.policy import VnlaPolicy
 from embodied.interface import Agent
@@ -81,9 +81,4 @@ class VnlaAgent(SightedAgent):
             return self.player(bank.blind(), BLIND[row])
         policy = self.policy(bank, None if row in (LEARNED, DIRECT) else ASKED[row])
         shown = policy.asker in ("random", "teacher")
-        return Supervised(policy, {"rules": rules_of(self.config)}) if shown else policy
-
-
-def rules_of(config: VnlaSettings) -> AskRules:
-    """The facts that its asking teacher uses."""
-    return AskRules(only=ASK_RULES[config.ask_rules])
+        return Supervised(policy, {"rules": AskRules()}) if shown else policy

@@ -24,12 +24,6 @@ TRAINED_UNDER: Mapping[str, str] = {
 }
 """Rule of play that an agent is judged under, to that which it is trained under: in training the advisor's actions
 replace the learner's while what it said is in force, as in the program (docs/sources.md, S112)."""
-ASK_RULES: Mapping[str, tuple[str, ...]] = {
-    "all": ("arrive", "deviate", "uncertain", "unmoved", "remain"),
-    "a and e": ("arrive", "deviate"),
-    "b to d": ("uncertain", "unmoved", "remain"),
-}
-"""Rules that the asking teacher goes by, by the names of the paper's ablation."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,8 +50,6 @@ class VnlaSettings(ImitationSettings):
     """Episodes per update."""
     asker: str = "learned"
     """Who decides when to ask, in training and evaluation: 'none', 'first', 'random', 'teacher' or 'learned'."""
-    ask_rules: str = "all"
-    """Rules of the asking teacher: 'all', 'a and e' or 'b to d'."""
     blind: bool = False
     """Ablation without vision: all features are zero."""
     rules: str = "indirect"
@@ -68,7 +60,6 @@ class VnlaSettings(ImitationSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_word(self, "asker", ASKERS)
-        require_word(self, "ask_rules", tuple(ASK_RULES))
         require_word(self, "rules", tuple(TRAINED_UNDER))
         require(self, AT_LEAST_ONE, "hidden_size", "word_embedding", "navigation_embedding", "ask_embedding")
         require(self, AT_LEAST_ONE, "budget_embedding")

@@ -18,7 +18,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from embodied.action_spaces import node_ahead
-from embodied.agents.common.vocabulary import Vocabulary, WordEmbedding
+from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.find.network import Look
 from embodied.agents.find.policy import WORDS, wanted
 from embodied.agents.vision.sighted_study import Split
@@ -57,7 +57,7 @@ class Looker(Look):
 
     def __init__(self, words: int, features: int, size: int, dropout: float) -> None:
         super().__init__(features, size, dropout)
-        self.words, self.request = WordEmbedding(words, size), nn.Linear(size, 2 * size)
+        self.words, self.request = nn.Embedding(words, size, padding_idx=0), nn.Linear(size, 2 * size)
         beside = lambda out: nn.Conv1d(size, out, 3, padding=1, padding_mode="circular")
         self.leads, self.ways, self.there = beside(1), beside(1), nn.Linear(2 * size, 1)
         self.asked, self.here = nn.Linear(size, ROOMS), nn.Linear(2 * size, ROOMS)

@@ -15,7 +15,6 @@ from torch import Tensor, nn
 
 from embodied.action_spaces import WORDS
 from embodied.agents.common.tensors import Rows
-from embodied.agents.common.vocabulary import WordEmbedding
 from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.looking import READING, Looker
 
@@ -75,7 +74,7 @@ class VnlaNetwork(nn.Module):
         super().__init__()
         h = config.hidden_size
         self.hidden_size = h
-        self.embedding = WordEmbedding(words, config.word_embedding)
+        self.embedding = nn.Embedding(words, config.word_embedding, padding_idx=0)
         self.reader = nn.LSTM(config.word_embedding, h, batch_first=True)
         self.moves = nn.Embedding(ACTIONS + 1, config.navigation_embedding)
         self.asks = nn.Embedding(3, config.ask_embedding)

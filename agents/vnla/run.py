@@ -24,7 +24,7 @@ from embodied.agents.common.tensors import negative_log_likelihood
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import Split, TrainingData
-from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent, rules_of
+from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent
 from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
 from embodied.agents.vnla.looking import lessons_of, reading_loss
 from embodied.agents.vnla.policy import VnlaMoment, for_training
@@ -44,7 +44,7 @@ class VnlaLearner(imitation.ImitationLearner):
 
     def __init__(self, agent: VnlaAgent, training: Split) -> None:
         super().__init__(agent, training)
-        self._player = for_training(agent.policy(training.bank), VnlaTeacher(rules=rules_of(self.config)))
+        self._player = for_training(agent.policy(training.bank), VnlaTeacher())
         shown = dataclasses.replace(training, bank=self._player.policy.bank)
         self._lessons = lessons_of(shown, agent.vocabulary)
 

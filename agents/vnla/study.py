@@ -1,4 +1,4 @@
-"""The tables of VNLA's first paper (Nguyen et al. 2019, arXiv 1812.04155) as data, and VNLA as a learner of the engine.
+"""The table of VNLA's first paper (Nguyen et al. 2019, arXiv 1812.04155) as data, and VNLA as a learner of the engine.
 
 Agents are judged with the program's five seeds, from which budgets are drawn. Other askers play with the learned
 asker's networks (docs/sources.md, S160).
@@ -15,7 +15,7 @@ from embodied.agents.common.session import Note
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy
-from embodied.agents.vnla.agent import AT_RANDOM, DIRECT, LEARNED, NEVER, TEACHER, VnlaAgent
+from embodied.agents.vnla.agent import AT_RANDOM, LEARNED, NEVER, TEACHER, VnlaAgent
 from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.run import train_agent
 from embodied.datasets.store import SplitData
@@ -50,26 +50,14 @@ VNLA_TABLES: Mapping[str, StudyTable] = {
         StudyRow("scripted listener asking at random", None, {"played": "listener, random"}),
         LISTENER,
         compared=((LEARNED_ASKER, RANDOM_ASKER), (LEARNED_ASKER, BLIND_ASKER), (LEARNED_ASKER, LISTENER)),
-    ),
-    "interventions": _table(
-        "Direct and indirect intervention",
-        _row("direct, not in words", rules="direct-mute"),
-        _row("direct, in words", DIRECT),
-        _row("indirect"),
-    ),
-    "rules": _table(
-        "Rules of the asking teacher",
-        _row("a and e", ask_rules="a and e"),
-        _row("b to d", ask_rules="b to d"),
-        _row("all"),
-    ),
+    )
 }
-"""The paper's Tables 2, 3 and 7."""
+"""The paper's Table 2."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class VnlaStudy(SightedStudy):
-    """Tables 2, 3 and 7 of VNLA's first paper."""
+    """Table 2 of VNLA's first paper."""
 
     config: VnlaSettings
     eval_seeds: tuple[int, ...] = EVALUATION_SEEDS

@@ -153,8 +153,6 @@ class AskRules:
     """(b) nats below the entropy of the uniform distribution over the six actions."""
     unmoved: int = 9
     """(c) equal entries at the end of the trail."""
-    only: tuple[str, ...] = ("arrive", "deviate", "uncertain", "unmoved", "remain")
-    """Rules in force, for the ablations (a and e; b to d)."""
 
 
 def ask_reason(
@@ -171,20 +169,18 @@ def ask_reason(
     here = s.trail[-1]
     goal = nearest(graph, here, s.task.goal_nodes)
     moves = None if thought is None or thought.moves is None else np.asarray(thought.moves, dtype=float)
-    if "arrive" in rules.only and moves is not None and here == goal and _best(moves) == "forward":
+    if moves is not None and here == goal and _best(moves) == "forward":
         return "arrive"
-    if "deviate" in rules.only:
-        planned = graph.path(s.trail[0], goal)
-        if min(graph.distance[here, v] for v in planned) > rules.deviate:
-            return "deviate"
-    if "uncertain" in rules.only and moves is not None:
+    if min(graph.distance[here, v] for v in graph.path(s.trail[0], goal)) > rules.deviate:
+        return "deviate"
+    if moves is not None:
         some = moves[moves > 0]
         if math.log(len(moves)) + float((some * np.log(some)).sum()) < rules.uncertain:
             return "uncertain"
     last = s.trail[-rules.unmoved :]
-    if "unmoved" in rules.only and len(last) == rules.unmoved and len(set(last)) == 1:
+    if len(last) == rules.unmoved and len(set(last)) == 1:
         return "unmoved"
-    if "remain" in rules.only and s.requests_left is not None and s.requests_left >= s.task.horizon - s.time:
+    if s.requests_left is not None and s.requests_left >= s.task.horizon - s.time:
         return "remain"
     return None
 

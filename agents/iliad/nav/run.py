@@ -14,7 +14,7 @@ from torch import Tensor
 
 from embodied.agents.common.session import Note
 from embodied.agents.common.tensors import greedy_choice
-from embodied.agents.common.vocabulary import build_vocabulary, use_vectors, vocabulary_with
+from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import load_into, load_weights, save_weights, seeded
 from embodied.agents.iliad.config import NavConfig
 from embodied.agents.iliad.nav.student import NAV_SPLITS, LoopFree, NavData, NavEyes, NavStudent
@@ -63,9 +63,7 @@ def new_follower(config: NavConfig, eyes: NavEyes, seed: int, name: str) -> Foll
     """An untrained follower, which is VLN's; its weights follow from seed and name."""
     c = FollowerSettings(hidden_size=config.hidden_size, dropout=config.dropout)
     with seeded(_beginning(seed, name)):
-        network = FollowerNetwork(c, len(eyes.vocabulary), eyes.bank.size)
-        use_vectors(network, eyes.vocabulary)
-        return network
+        return FollowerNetwork(c, len(eyes.vocabulary), eyes.bank.size)
 
 
 def _beginning(seed: int, name: str) -> int:
@@ -136,7 +134,7 @@ def load_follower(path: Path, eyes: NavEyes) -> NavStudent:
             "name it by --encoder"
         )
     c = about.config
-    own = NavEyes(eyes.places, eyes.bank, vocabulary_with(about.words, c.word_vectors))
+    own = NavEyes(eyes.places, eyes.bank, Vocabulary(about.words))
     follower = new_follower(c, own, 0, "loaded")
     load_into(follower, tensors, path)
     return NavStudent(follower.eval(), own.blind() if c.blind else own, c)
@@ -204,9 +202,8 @@ class NavSetup:
         names = tuple(name for many in houses.values() for name in many)
         places = {name: source.place(name) for name in names}
         vocabulary = build_vocabulary(request for trip in splits["train"] for request in trip.requests)
-        words = vocabulary_with(vocabulary.words, config.word_vectors)
         features = house_features(source, names, self.encoder, self.picture_kind, self.cache)
-        eyes = NavEyes(places, FeatureBank(features, self.encoder), words)
+        eyes = NavEyes(places, FeatureBank(features, self.encoder), vocabulary)
         return NavData(source, eyes, splits, drawings_of(source, names, self.picture_kind))
 
     def prepare(self, folder: Path, note: Note) -> NavGrounds:
