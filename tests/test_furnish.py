@@ -21,7 +21,7 @@ from embodied.generate.config import RETRIES
 from embodied.generate.furnish import furnish
 from embodied.generate.furnish.space import box, overlap, room_space
 from embodied.generate.furnish.tables import tables
-from embodied.generate.requirements import missing_requirements
+from embodied.generate.stages import missing_requirements
 from embodied.geometry import facing_of, rectangle, wrap
 from embodied.house.house import DOORS, House, HouseError, Opening, Room, Storey, check
 from embodied.house.validation import STYLES

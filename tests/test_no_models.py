@@ -8,7 +8,7 @@ import embodied.assets.importing.sh3f as sh3f
 from embodied.assets.built import BASICS
 from embodied.assets.catalogue import _tell_once, load_catalogue
 from embodied.generate import HouseConfig, generate_house
-from embodied.generate.requirements import missing_requirements
+from embodied.generate.stages import missing_requirements
 
 
 def test_a_house_without_models_lacks_nothing(tmp_path, monkeypatch):

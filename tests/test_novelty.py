@@ -11,8 +11,7 @@ from hand_data import DATA_KINDS, build
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.build import DatasetConfig
 from embodied.generate import HouseConfig, generate_house
-from embodied.generate.novelty import NOVEL_STYLE, finishes_of, furnishable
-from embodied.generate.style_finishes import STYLE_FINISHES
+from embodied.generate.novelty import NOVEL_STYLE, STYLE_FINISHES, finishes_of, furnishable
 from embodied.house.house import HouseError
 from embodied.language import People
 from embodied.language.clauses import Enter, Forward, StopBy, To, Turn

@@ -14,8 +14,7 @@ import shapely
 
 from embodied.generate.access import MOVING
 from embodied.generate.kinds import BEDROOMS
-from embodied.generate.novelty import finishes_of, styles_of
-from embodied.generate.style_finishes import FINISH_TABLE
+from embodied.generate.novelty import FINISH_TABLE, finishes_of, styles_of
 from embodied.house.house import House, Room
 
 WET = ("bathroom", "toilet", "laundry_room")

@@ -390,9 +390,7 @@ def _garage_door(made: _Openings, i: int) -> None:
 def _french_window(made: _Openings, i: int, rng: np.random.Generator) -> None:
     cell = made.plan.cells[i]
     is_bedroom = cell.kind == "main_bedroom"
-    chance = FRENCH_BEDROOM if is_bedroom else FRENCH[cell.kind]
-    if is_bedroom and _area(cell) < LARGE_BEDROOM:
-        chance = 0.0
+    chance = FRENCH[cell.kind] if not is_bedroom else FRENCH_BEDROOM if _area(cell) >= LARGE_BEDROOM else 0.0
     if rng.random() >= chance or not made.outside[i] or made.outside[i][0].length <= 2.2:
         return
     w = made.outside[i][0]

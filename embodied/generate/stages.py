@@ -13,21 +13,23 @@ from typing import SupportsIndex, TypeVar
 import numpy as np
 
 from embodied.assets.catalogue import Catalogue, load_catalogue
+from embodied.generate.access import MOVING
 from embodied.generate.config import RETRIES, DeadEndError, HouseConfig
 from embodied.generate.finishes import Palette, assign_materials, draw_palette
 from embodied.generate.footprint import Footprint, draw_footprint, draw_shape
 from embodied.generate.furnish import furnish
+from embodied.generate.furnish.tables import tables, tables_of
+from embodied.generate.kinds import BEDROOMS
 from embodied.generate.layout import FloorPlan, draw_plan, turned, with_short_corridors
 from embodied.generate.modules import Cell
 from embodied.generate.novelty import furnishable
 from embodied.generate.openings import Leaves, draw_openings
 from embodied.generate.program import WantedRoom, draw_area, draw_program
-from embodied.generate.requirements import missing_requirements
 from embodied.generate.stairwell import SLAB, TALLEST, stair_of
 from embodied.generate.storeys import draw_storeys
 from embodied.generate.walkways import remove_blocking_objects
 from embodied.geometry import wrap
-from embodied.house.house import House, HouseError, Room, Sky, Stair, Storey, check
+from embodied.house.house import DOORS, House, HouseError, Room, Sky, Stair, Storey, check
 from embodied.house.shapes import inward
 from embodied.navigation.graph import unreachable_rooms
 from embodied.seeds import checked_seed, stream
@@ -260,7 +262,7 @@ def generate_house(
     """The house that belongs to `seed`: the same in every process and on every machine.
 
     Of up to `RETRIES.house` houses, the first that lacks nothing that makes its rooms what they are
-    (requirements.py), or the one that lacks least. A plan that lacks the same twice is not tried again.
+    (`missing_requirements`), or the one that lacks least. A plan that lacks the same twice is not tried again.
 
     Args:
       seed: any integer.
@@ -306,3 +308,34 @@ def _title(draft: Draft) -> str:
     storeys = len(_made(draft.plan, "rooms").storeys)
     high = f"{storeys}-storey " if storeys > 1 else ""
     return f"{shape}{high}{what} with {beds} bedroom{'s' if beds != 1 else ''}, {draft.area:.0f} m2"
+
+
+FLAT = 75.0
+"""Up to here bedrooms may open off the living room, square metres."""
+
+
+def missing_requirements(house: House, catalogue: Catalogue | None = None) -> tuple[str, ...]:
+    """'kitchen_1: fridge' for everything that a room of `house` lacks, 'bedroom_1: way from a hall or corridor'.
+
+    Counted are the needs of the table of rooms that name object classes. The furnisher tries for
+    more; and it is asked of the finished house, because clearing the ways may take a bed out again.
+
+    Args:
+      catalogue: one whose own groups have needs, too.
+    """
+    there: dict[str, set[str]] = {}
+    for p in house.placements:
+        there.setdefault(p.room, set()).add(p.object_class)
+    known = tables_of(catalogue) if catalogue is not None else tables()
+    short = [
+        f"{r.id}: {need.roles[0]}"
+        for r in house.rooms
+        for need in (known.rooms[r.kind].needs if r.kind in known.rooms else ())
+        if need.classes and not any({*known.classes(c)} & there.get(r.id, set()) for c in need.classes)
+    ]
+    if house.area <= FLAT:
+        return tuple(short)
+    moving = {r.id for r in house.rooms if r.kind in MOVING}
+    entered = {name for o in house.openings if o.kind in DOORS and moving & {*o.rooms} for name in o.rooms}
+    through = (r.id for r in house.rooms if r.kind in BEDROOMS and r.id not in entered)
+    return (*short, *(f"{name}: way from a hall or corridor" for name in through))

@@ -1,7 +1,7 @@
 """Furnishing: a House with rooms and openings becomes one with objects and lights.
 
 Room by room: groups of furniture claim their place in order of importance (rooms.toml and groups.toml), then what a
-user's own classes add (own.py), then what hangs on ceilings and walls (ceilings.py, hanging.py, pictures.py), then
+user's own classes add (room.py), then what hangs on ceilings and walls (hanging.py), then
 small things on all of it (smalls.toml), then lights. docs/houses.md tells more.
 """
 
@@ -9,21 +9,22 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
 
 from embodied.assets.catalogue import Catalogue
 from embodied.generate.config import RETRIES
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.hanging import hang_all
-from embodied.generate.furnish.lights import lights
-from embodied.generate.furnish.own import place_own
-from embodied.generate.furnish.room import furnish_room, shortage
+from embodied.generate.furnish.room import furnish_room, place_own, shortage
 from embodied.generate.furnish.smalls import clutter
 from embodied.generate.furnish.space import RoomSpace, Thing, room_space
 from embodied.generate.furnish.stock import Stock
 from embodied.generate.furnish.tables import tables_of
 from embodied.generate.household import household_of
 from embodied.geometry import wrap
-from embodied.house.house import House, Placement, Room, rounded
+from embodied.house.house import House, Light, Placement, Room, rounded
 from embodied.seeds import stream
 
 
@@ -108,3 +109,37 @@ def _placements(rooms: list[RoomSpace]) -> tuple[Placement, ...]:
                 )
             )
     return tuple(placements)
+
+
+WARM, NEUTRAL = (1.0, 0.72, 0.44), (1.0, 0.9, 0.78)
+"""Linear colours of about 2700 K and 4000 K."""
+
+
+def lights(placements: Sequence[Placement], stock: Stock, *, rng: np.random.Generator) -> tuple[Light, ...]:
+    """One light per lamp, at its bulb; some table lamps are off."""
+    shining: list[Light] = []
+    share = 0.35 * (1 - stock.style.warmth)
+    red, green, blue = (round((1 - share) * w + share * n, 3) for w, n in zip(WARM, NEUTRAL))
+    for p in placements:
+        lumens = stock.tables.lumens.get(p.object_class)
+        if lumens is None:
+            continue
+        x, y, z = p.position
+        main = p.object_class in stock.tables.alike["main lamps"]
+        hanging = main or p.object_class == "ceiling fan"
+        bulb = z + (0.35 * p.size[2] if hanging else 0.78 * p.size[2])
+        cool = p.object_class == "fluorescent lamp"
+        on = True if main else bool(rng.random() < 0.7)
+        scale = min(max(p.size[0] / 0.5, 0.6), 1.6) if hanging else 1.0
+        shining.append(
+            Light(
+                id=f"light_{len(shining) + 1}",
+                room=p.room,
+                placement=p.id,
+                position=rounded((x, y, bulb)),
+                color=NEUTRAL if cool else (red, green, blue),
+                power=round(lumens * scale, 0),
+                on=on,
+            )
+        )
+    return tuple(shining)

@@ -145,17 +145,15 @@ class _Trial:
         thing = self._thing(item)
         b, flat = thing.box, is_flat(item.extent, item.z)
         zone = _clear_zone(item, thing) if item.clear else None
-        if not self._stands(item, b, flat) or not (
-            zone is None or (self.space.inside(zone) and self.space.is_clear(zone))
+        if not self._stands(item, b, flat) or (
+            zone is not None and not (self.space.inside(zone) and not any(overlap(zone, q) for q in self.space.solids))
         ):
             self._keep(None, None)
             return item.optional
         if zone is not None:
             self.zones[len(self.things)] = zone
             if item.clear >= 0.5:
-                away = item.extent[1] / 2 + self.space.radius + 0.06
-                fx, fy = thing.front
-                self.reach.append((thing.x + fx * away, thing.y + fy * away))
+                self.reach.append(thing.local(0.0, -(item.extent[1] / 2 + self.space.radius + 0.06)))
         self._keep(thing, None if flat else b)
         return True
 
@@ -173,8 +171,9 @@ class _Trial:
         """True if an item finds room among what stands in the room and in the arrangement."""
         if item.needs is not None and self.things[item.needs] is None:
             return False
-        if flat:
-            return _flat_fits(self.space, b)
+        if flat:  # rugs lie inside the room and not on one another or on tall built-ins' feet
+            low = (q for q in self.space.solids if q.top - self.space.bottom <= 0.03)
+            return self.space.inside(b) and not any(overlap(replace(b, top=b.bottom + 0.02), q) for q in low)
         allowed = [q for i in item.under if (q := self.boxes[i]) is not None]
         return (
             self.space.fits(b, ignore=allowed, passage=item.passage, aside=item.aside)
@@ -225,12 +224,6 @@ def _without_optional(items: Sequence[Item], things: Sequence[Thing | None]) -> 
         )
         kept.append(None if left_out else thing)
     return kept
-
-
-def _flat_fits(space: RoomSpace, b: Box) -> bool:
-    """Rugs lie inside the room and not on one another or on tall built-ins' feet."""
-    grown = replace(b, top=b.bottom + 0.02)
-    return space.inside(b) and not any(overlap(grown, q) for q in space.solids if q.top - space.bottom <= 0.03)
 
 
 def _rest(space: RoomSpace, item: Item, parent: Thing | None, group: str) -> Thing | None:

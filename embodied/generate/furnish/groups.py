@@ -91,9 +91,7 @@ def _model(ctx: Context, part: GroupPart, k: int, of: Asset | None) -> Asset | N
     high[1] = min(high[1], at_round(part.deepest, k, NO_LIMIT))
     high[2] = min(high[2], ctx.space.height - 0.03)
     stretched = part.wider is not None or part.width is not None or part.of_room is not None
-    least, most = (
-        (NO_LEAST_SIZE, NO_MOST_SIZE) if stretched else ((low[0], low[1], low[2]), (high[0], high[1], high[2]))
-    )
+    least, most = (NO_LEAST_SIZE, NO_MOST_SIZE) if stretched else ((*low,), (*high,))
     before = ctx.roles(part.name) if part.same else []
     if before and ctx.chance(part.same):
         return before[-1].asset
@@ -177,10 +175,7 @@ class _Plan:
         u, v, turn = place
         rng = self.ctx.rng
         if part.position_jitter:
-            u, v = (
-                u + rng.uniform(-part.position_jitter, part.position_jitter),
-                v + rng.uniform(-part.position_jitter, part.position_jitter),
-            )
+            u, v = (c + rng.uniform(-part.position_jitter, part.position_jitter) for c in (u, v))
         turn += self._turn(part, asset)
         mounted = asset.support == "wall" and part.at != "on"
         z = part.z if part.z is not None else asset.elevation * mounted
@@ -239,18 +234,10 @@ Places = Iterable[tuple[float, float, float]]
 """(x, y, yaw) in the frame of what a part goes by: x to the right of who faces it, its front toward -y."""
 
 
-def _on(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
-    yield plan.hand * part.off_middle * anchor.size[0], -part.forward, 0.0
-
-
 def _about(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
     rng, (w, d, _) = plan.ctx.rng, anchor.size
     for _ in range(int(at_round(part.count, plan.round, 1)) + int(rng.integers(part.more + 1))):
         yield rng.uniform(-0.4, 0.4) * w, rng.uniform(-0.4, 0.4) * d, 0.0
-
-
-def _before(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
-    yield 0.0, -anchor.size[1] / 2 - part.gap - size[1] / 2 - part.forward, 0.0
 
 
 def _beside(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
@@ -262,19 +249,10 @@ def _beside(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Siz
         yield plan.hand * sign * x, y, -plan.hand * sign * math.radians(part.turn)
 
 
-def _over(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
-    yield 0.0, (anchor.size[1] - size[1]) / 2, 0.0
-
-
-def _facing(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
-    yield plan.aside, -(plan.distance - size[1] / 2) - anchor.y, math.pi
-
-
 def _row(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
     count = max(1, int(anchor.size[0] / part.every))
     for k in range(count):
-        x = ((k + 0.5) / count - 0.5) * anchor.size[0]
-        yield x, -anchor.size[1] / 2 - part.gap - size[1] / 2, 0.0
+        yield ((k + 0.5) / count - 0.5) * anchor.size[0], -anchor.size[1] / 2 - part.gap - size[1] / 2, 0.0
 
 
 def _facing_point(x: float, y: float, tx: float, ty: float) -> float:
@@ -309,13 +287,13 @@ def _seats(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size
 
 
 AROUND: dict[str, Callable[[_Plan, GroupPart, _Spot, Asset, Size], Places]] = {
-    "on": _on,
-    "under": _on,
+    "on": lambda plan, part, at, *_: [(plan.hand * part.off_middle * at.size[0], -part.forward, 0.0)],
+    "under": lambda plan, part, at, *_: [(plan.hand * part.off_middle * at.size[0], -part.forward, 0.0)],
     "about": _about,
-    "before": _before,
+    "before": lambda _, part, at, __, size: [(0.0, -at.size[1] / 2 - part.gap - size[1] / 2 - part.forward, 0.0)],
     "beside": _beside,
-    "over": _over,
-    "facing": _facing,
+    "over": lambda _, __, at, ___, size: [(0.0, (at.size[1] - size[1]) / 2, 0.0)],
+    "facing": lambda plan, _, at, __, size: [(plan.aside, -(plan.distance - size[1] / 2) - at.y, math.pi)],
     "seats": _seats,
     "row": _row,
 }

@@ -93,16 +93,12 @@ def _kitchen_set(ctx: Context, tag: str) -> KitchenSet | None:
 
 def free_runs(space: RoomSpace, wall: Wall, depth: float, height: float) -> list[tuple[float, float]]:
     """Stretches of a wall along which a thing `depth` deep and `height` tall may stand, metres."""
-    step = 0.05
+    step, start = 0.05, None
     runs: list[tuple[float, float]] = []
-    start = None
     count = int(wall.length / step)
     for i in range(count + 1):
-        free = False
-        if i < count:
-            x, y = wall.point((i + 0.5) * step, depth / 2 + 0.005)
-            probe = box(x, y, step, depth, wall.yaw, space.bottom, space.bottom + height)
-            free = space.fits(probe)
+        x, y = wall.point((i + 0.5) * step, depth / 2 + 0.005)
+        free = i < count and space.fits(box(x, y, step, depth, wall.yaw, space.bottom, space.bottom + height))
         if free and start is None:
             start = i * step
         if not free and start is not None:
@@ -123,8 +119,7 @@ def _edge(space: RoomSpace, wall: Wall, s: float, sign: int, depth: float, heigh
 
 def kitchen_line(ctx: Context) -> bool:
     """The line of units and the fridge; in some later attempts the fridge chooses its place first."""
-    first = ctx.attempt in (3, 5)
-    if first:
+    if first := ctx.attempt in (3, 5):
         _lone_fridge(ctx)
     has_line = _line(ctx, fridge=not first)
     if not ctx.roles("fridge"):
@@ -334,9 +329,7 @@ def _slots(ctx: Context, line: UnitLine, count: int, start: float, view: float |
         elif k == j:
             k += cook
         else:
-            n = 1
-            while n < 2 and k + n < count and k + n not in (i, j):
-                n += 1
+            n = 2 if k + 1 < count and k + 1 not in (i, j) else 1
             slots.append(("base", k, n))
             k += n
     return [UnitSlot(kind, n, start + (first + n / 2) * width) for kind, first, n in sorted(slots, key=lambda s: s[1])]

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from embodied.generate.furnish.arrange import Item
-from embodied.generate.furnish.context import Context
-from embodied.generate.furnish.space import RoomSpace, Thing, Wall
+if TYPE_CHECKING:
+    from embodied.generate.furnish.arrange import Item
+    from embodied.generate.furnish.context import Context
+    from embodied.generate.furnish.space import RoomSpace, Thing, Wall
 
 WINDOWS = ("window", "french_window")
 TALL = 0.95

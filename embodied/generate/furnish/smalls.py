@@ -70,14 +70,9 @@ class SurfaceOccupancy:
     def __post_init__(self) -> None:
         for thing in self.ctx.things:
             self.alike[thing.asset.object_class] += 1
-            if thing.parent is not None:
-                self._occupy(thing, thing.parent)
-
-    def _occupy(self, thing: Thing, parent: Thing) -> None:
-        u, v = _in_frame(parent, thing)
-        a, b = _reach(thing.size, thing.yaw - parent.yaw)
-        key = (id(parent), thing.surface or "")
-        self.taken.setdefault(key, []).append((u - a, v - b, u + a, v + b))
+            if (parent := thing.parent) is not None:
+                (u, v), (a, b) = _in_frame(parent, thing), _reach(thing.size, thing.yaw - parent.yaw)
+                self.taken.setdefault((id(parent), thing.surface or ""), []).append((u - a, v - b, u + a, v + b))
 
     def area(self, board: CarrierSurface) -> tuple[float, float, float, float]:
         """x0, x1, y0, y1 of what things may lie on: off the arms, backs and pillows of seats."""
@@ -128,12 +123,9 @@ class SurfaceOccupancy:
             return np.zeros((0, 2))
         us, vs = _steps(low_x, high_x), _steps(low_y, high_y)
         taken = np.array(self.taken.setdefault(board.key, [])).reshape(-1, 4)
-        beside = (us[:, None] >= taken[:, 2] + a + THING_GAP) | (
-            us[:, None] <= taken[:, 0] - a - THING_GAP
-        )  # (columns, n)
-        before = (vs[:, None] >= taken[:, 3] + b + THING_GAP) | (
-            vs[:, None] <= taken[:, 1] - b - THING_GAP
-        )  # (rows, n)
+        # (columns, n) and (rows, n)
+        beside = (us[:, None] >= taken[:, 2] + a + THING_GAP) | (us[:, None] <= taken[:, 0] - a - THING_GAP)
+        before = (vs[:, None] >= taken[:, 3] + b + THING_GAP) | (vs[:, None] <= taken[:, 1] - b - THING_GAP)
         columns, rows = np.nonzero(np.all(beside[:, None] | before[None], axis=2))
         return np.stack([us[columns], vs[rows]], axis=1)
 
@@ -150,13 +142,11 @@ class SurfaceOccupancy:
             return
         (x, y), (w, d, h), z = board.carrier.local(u, v), asset.size, board.top
         own = box(x, y, w, d, board.carrier.yaw + turn, z, z + h)
-        if self._meets_others(own, board.carrier):
-            return
-        self._lay(asset, board, taken, turn, own, asset.size)
+        if not self._meets_others(own, board.carrier):
+            self._lay(asset, board, taken, turn, own, asset.size)
 
     def _meets_others(self, own: Box, carrier: Thing) -> bool:
-        support = carrier.box
-        return any(overlap(own, q) and not same_box(q, support) for q in self.ctx.space.solids)
+        return any(overlap(own, q) and not same_box(q, carrier.box) for q in self.ctx.space.solids)
 
     def _lay(
         self,
@@ -338,8 +328,6 @@ def _more(occupancy: SurfaceOccupancy, thing: Thing) -> None:
     top = main_board(thing)
     area = (top.surface.x1 - top.surface.x0) * (top.surface.y1 - top.surface.y0)
     count = int(ctx.rng.poisson(min(area * 1.6, 2.0) * _density(ctx)))
-    if not count:
-        return
     fitting = ctx.stock.resting_on(thing.asset.object_class, ctx.kind)
     for _ in range(min(count, 4)):
         options = [(a, w) for a, w in fitting if occupancy.allows(a)]
@@ -395,14 +383,12 @@ def _leave(occupancy: SurfaceOccupancy, small: SmallObject, carriers: list[Thing
         return
     if small.on:
         _lay_on(occupancy, small, asset, carriers)
-        return
-    if small.wall is not None:
+    elif small.wall is not None:
         z = min(small.wall, ctx.space.height - 0.1) - asset.size[2]
         hanging = Hanging(asset, z, "left", asset.object_class, margin=0.012)
-        is_placed = hang_first(ctx, hanging, _wall_spots(ctx, small, asset)) is not None
+        occupancy.alike[asset.object_class] += hang_first(ctx, hanging, _wall_spots(ctx, small, asset)) is not None
     else:
-        is_placed = _put_down(ctx, small, asset)
-    occupancy.alike[asset.object_class] += is_placed
+        occupancy.alike[asset.object_class] += _put_down(ctx, small, asset)
 
 
 def _lay_on(occupancy: SurfaceOccupancy, small: SmallObject, asset: Asset, carriers: list[Thing]) -> None:

@@ -224,20 +224,13 @@ class RoomSpace:
           passage: whether it may reach into keep-outs and clearances (a curtain, a rug).
           aside: whether it may reach into clearances (slippers).
         """
-        if not self.inside(b):
-            return False
-        if b.top > self.bottom + self.height + TOUCH:
+        if not self.inside(b) or b.top > self.bottom + self.height + TOUCH:
             return False
         if not passage and any(overlap(b, k) for k in self.keepouts):
             return False
-        for other in self.solids:
-            if overlap(b, other) and not any(other is i for i in ignore):
-                return False
+        if any(overlap(b, other) and not any(other is i for i in ignore) for other in self.solids):
+            return False
         return passage or aside or not any(overlap(b, c) for c in self.clearances)
-
-    def is_clear(self, b: Box) -> bool:
-        """True if no solid reaches into the clearance `b`."""
-        return not any(overlap(b, other) for other in self.solids)
 
     def walkable(self, added: Iterable[Box], reach: Iterable[tuple[float, float]]) -> np.ndarray | None:
         """The walking plan with `added` boxes in it, or None if it would cut the room apart.
@@ -252,17 +245,12 @@ class RoomSpace:
         cells = [self._cell(p) for p in (*self.entries, *reach)]
         if not cells:
             return plan
-        count, labels, stats, _ = cv2.connectedComponentsWithStats(plan, connectivity=4)
-        if count < 2:
-            return None
+        _, labels, stats, _ = cv2.connectedComponentsWithStats(plan, connectivity=4)
         seen = {self._label(labels, c) for c in cells}
         if len(seen) != 1 or 0 in seen:
             return None
-        (main,) = seen
-        free = int(stats[1:, cv2.CC_STAT_AREA].sum())
-        if stats[main, cv2.CC_STAT_AREA] < 0.88 * free:
-            return None
-        return plan
+        free = stats[:, cv2.CC_STAT_AREA]
+        return plan if free[seen.pop()] >= 0.88 * int(free[1:].sum()) else None
 
     def leaves_a_way_past(self, b: Box) -> bool:
         """True if someone `NARROW` wide still gets from every door to every other past the box `b`.
@@ -282,8 +270,7 @@ class RoomSpace:
 
     def taken(self, b: Box) -> float:
         """How much of the floor that one can walk on `b` would take, square metres."""
-        plan = self.walk.copy()
-        cv2.fillConvexPoly(plan, self._cells(b.corners(self.radius)), 0)
+        plan = self.without_floor(b, self.radius).walk
         return float(int(self.walk.sum()) - int(plan.sum())) * WALK_CELL**2
 
     def holding(
@@ -324,9 +311,7 @@ class RoomSpace:
     def _label(labels: np.ndarray, cell: tuple[int, int]) -> int:
         """The free part that contains the cell or one of its close neighbours, else 0."""
         r, c = cell
-        near = labels[max(r - 2, 0) : r + 3, max(c - 2, 0) : c + 3]
-        here = int(labels[r, c])
-        return here if here else int(near.max(initial=0))
+        return int(labels[r, c]) or int(labels[max(r - 2, 0) : r + 3, max(c - 2, 0) : c + 3].max(initial=0))
 
 
 def room_space(house: House, room: Room) -> RoomSpace:
@@ -419,9 +404,8 @@ def _walls(floor: shapely.Polygon, openings: Sequence[Opening], thickness: float
             if abs(a @ inward + thickness / 2) > 0.02 or abs(b @ inward + thickness / 2) > 0.02:
                 continue
             s0, s1 = sorted((float(a @ along), float(b @ along)))
-            if s1 < 0 or s0 > lengths[i]:
-                continue
-            holes.append((s0, s1, o))
+            if s1 >= 0 and s0 <= lengths[i]:
+                holes.append((s0, s1, o))
         holes.sort(key=lambda f: (f[0], f[2].id))
         walls.append(
             Wall(

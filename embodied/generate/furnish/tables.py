@@ -18,6 +18,7 @@ import numpy as np
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import RecordError, from_plain, read_toml
 from embodied.assets.records import Size
+from embodied.generate.furnish.likes import LIKES
 from embodied.generate.furnish.style import Style
 from embodied.house.house import HouseError
 
@@ -26,25 +27,6 @@ BUILT = ("kitchen_line",)
 """Groups that code arranges (kitchen.py)."""
 PLACES = ("wall", "floor", "open", "middle", "door", "ahead")
 AT = ("wall", "on", "under", "about", "before", "beside", "over", "facing", "seats", "row")
-LIKES = (
-    "corner",
-    "centre",
-    "window",
-    "shade",
-    "window_wall",
-    "door",
-    "near",
-    "near_window",
-    "near_door",
-    "far_from_door",
-    "neighbour",
-    "across",
-    "room_before",
-    "facing_door",
-    "middle",
-    "long",
-    "noise",
-)
 PER = ("room", "carrier", "person", "adult", "child", "young")
 
 
@@ -217,7 +199,7 @@ class FurnitureGroup:
     def __post_init__(self) -> None:
         _one_of("place", self.place, PLACES)
         for word in self.likes:
-            _one_of("likes", word, LIKES)
+            _one_of("likes", word, tuple(w for w in LIKES if w != "ahead"))
         if not self.parts:
             raise RecordError("a group needs at least one part")
         known = {p.called for p in self.parts}
