@@ -152,14 +152,10 @@ def load_run(folder: Path) -> list[Listed]:
             "opens recordings"
         )
     episodes = []
-    for path in files:
-        episodes += [Listed(_name(path.name), e) for e in load_lines(path, Episode)]
+    for path in files:  # 'val seen learned' of episodes_val_seen_learned.jsonl
+        name = path.stem.removeprefix("episodes").strip("_").replace("_", " ") or "agent"
+        episodes += [Listed(name, e) for e in load_lines(path, Episode)]
     return episodes
-
-
-def _name(file: str) -> str:
-    """Split and agent of a file of episodes: 'val seen learned' of 'episodes_val_seen_learned.jsonl'."""
-    return Path(file).stem.removeprefix("episodes").strip("_").replace("_", " ") or "agent"
 
 
 def summary_line(number: int, listed: Listed) -> str:

@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from embodied.assets.decoding import read_picture
 from embodied.assets.records import Finish, MeshPart
 from embodied.geometry import rotation
+from embodied.render.gloss import texels_at
 from embodied.scene.house_meshes import Part
 from embodied.scene.lit_pages import LitMesh, LitPages
 
@@ -60,7 +61,9 @@ def light_meshes(parts: Sequence[Part], hidden: frozenset[str] = frozenset()) ->
         for part in group:
             key = (part.mesh_key, id(part.mesh))
             if key not in reduced:
-                reduced[key] = _reduce(part.mesh, _share(owner, BUDGET, len(group)) if part.kind == "object" else None)
+                whole = part.mesh.vertices, part.mesh.normals, vertex_colors(part.mesh), part.mesh.faces
+                is_object = part.kind == "object"
+                reduced[key] = _simplified(*whole, _share(owner, BUDGET, len(group))) if is_object else whole
             positions, normals, colors, faces = reduced[key]
             pieces.append((*_placed(positions, normals, part), colors, faces))
         meshes.append(_joined(f"house/{room or 'shared'}/{owner.split('/')[-1]}", pieces))
@@ -121,11 +124,8 @@ def _lit_piece(mesh: LitMesh, page: np.ndarray, budget: int) -> tuple:
 
     A vertex has the mean colour of the faces around it.
     """
-    height, width = page.shape[:2]
     at = np.einsum("sk,mkc->smc", SPOTS / SPOTS.sum(1, keepdims=True), mesh.uv[mesh.faces])  # (7, m, 2)
-    column = (at[..., 0] * width).astype(int).clip(0, width - 1)
-    row = (at[..., 1] * height).astype(int).clip(0, height - 1)
-    of_face = page[row, column].astype(np.float32).mean(axis=0)  # (m, 3)
+    of_face = texels_at(page, at).astype(np.float32).mean(axis=0)  # (m, 3)
     corner, count = mesh.faces.ravel(), np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)).clip(1)
     sums = np.stack([np.bincount(corner, np.repeat(of_face[:, c], 3), len(mesh.vertices)) for c in range(3)], 1)
     colors = np.full((len(mesh.vertices), 4), round(255 * mesh.alpha), np.uint8)
@@ -144,14 +144,6 @@ def _joined(path: str, pieces: Sequence[tuple], shaded: bool = True) -> LightMes
     faces = np.concatenate([p[3] + s for p, s in zip(pieces, starts)]).astype(np.uint32)
     positions, normals, colors = (np.concatenate([p[i] for p in pieces]) for i in range(3))
     return LightMesh(path, positions.astype(np.float32), faces, colors, normals.astype(np.float32) if shaded else None)
-
-
-def _reduce(mesh: MeshPart, budget: int | None) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices, normals, colours and faces with at most about `budget` triangles."""
-    colors = vertex_colors(mesh)
-    if budget is None:
-        return mesh.vertices, mesh.normals, colors, mesh.faces
-    return _simplified(mesh.vertices, mesh.normals, colors, mesh.faces, budget)
 
 
 def _simplified(vertices: np.ndarray, normals: np.ndarray, colors: np.ndarray, faces: np.ndarray, budget: int) -> tuple:

@@ -1,5 +1,5 @@
-"""Materials that each style of a house chooses from; houses of familiar or of novel things: which models, and which look,
-houses to learn from never hold.
+"""Materials that each style of a house chooses from; houses of familiar or of novel things: which models, and which
+look, houses to learn from never hold.
 
 Names of materials only ('oak_planks/0'); assets.materials makes them. The table is style_finishes.toml beside this
 module.

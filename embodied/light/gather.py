@@ -18,7 +18,7 @@ from embodied.house.house import House
 from embodied.house.moment import Moment, RigidPose
 from embodied.light.movers import RAY_LIFT, Cloud, Placed, cosine_directions, discs_of, hiding
 from embodied.light.tracing.emitters import GLAZING, Lamp
-from embodied.render.gloss import Rays
+from embodied.render.gloss import Rays, texels_at
 from embodied.scene.lit_pages import LitMesh
 
 GATHER_RAYS = 96
@@ -52,23 +52,18 @@ class LitRays:
     def along(self, start: np.ndarray, ahead: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Radiance (n, 3) met by rays, and how far away, (n,) metres; infinite for the sky."""
         face, far, u, v = self.first(start, ahead)
-        out = self._of_sky(ahead)
+        h, w = self.sky.shape[:2]
+        column = ((np.pi - np.arctan2(ahead[:, 1], ahead[:, 0])) / (2 * np.pi) * w).astype(int) % w
+        row = np.minimum((np.arccos(np.clip(ahead[:, 2], -1, 1)) / np.pi * h).astype(int), h - 1)
+        out = self.sky[row, column] * np.float32(GLAZING)
         which = np.flatnonzero(face >= 0)
         weights = np.stack([1 - u - v, u, v], axis=1)[which]
         at = np.einsum("nk,nkc->nc", weights, self.uv[face[which]])
         pages = self.page[face[which]]
         for number in np.unique(pages):
-            own, sent = pages == number, self.radiance[int(number)]
-            h, w = sent.shape[:2]
-            column, row = (np.clip(at[own, k] * n, 0, n - 1).astype(int) for k, n in ((0, w), (1, h)))
-            out[which[own]] = sent[row, column]
+            own = pages == number
+            out[which[own]] = texels_at(self.radiance[int(number)], at[own])
         return out, np.where(face >= 0, far, np.inf)
-
-    def _of_sky(self, ahead: np.ndarray) -> np.ndarray:
-        h, w = self.sky.shape[:2]
-        column = ((np.pi - np.arctan2(ahead[:, 1], ahead[:, 0])) / (2 * np.pi) * w).astype(int) % w
-        row = np.minimum((np.arccos(np.clip(ahead[:, 2], -1, 1)) / np.pi * h).astype(int), h - 1)
-        return self.sky[row, column] * np.float32(GLAZING)
 
 
 def behind(

@@ -29,7 +29,7 @@ from embodied.light.probes import turned
 from embodied.light.settings import LightSettings
 from embodied.light.skins import Skin, person_parts
 from embodied.light.tracing.rays import gloss_data_of
-from embodied.render.gloss import GlossData
+from embodied.render.gloss import GlossData, texels_at
 from embodied.scene.cupboards import lit_apart
 from embodied.scene.house_meshes import object_parts
 from embodied.scene.joinery import opening_parts
@@ -431,12 +431,7 @@ def _tint(s: Surface, m: LitMesh, gloss: np.ndarray) -> np.ndarray | None:
     """(m, 3) float32 colour of the middle of each face; None where none is of metal."""
     if not gloss[:, 2].any():
         return None
-    picture = s.pages[m.page].albedo
-    h, w = picture.shape[:2]
-    at = m.uv[m.faces].mean(1)
-    x, y = (np.clip(at[:, k] * n, 0, n - 1).astype(int) for k, n in ((0, w), (1, h)))
-    tint: np.ndarray = picture[y, x]
-    return tint
+    return texels_at(s.pages[m.page].albedo, m.uv[m.faces].mean(1))
 
 
 def _nothing(m: LitMesh) -> LitMesh:

@@ -72,7 +72,5 @@ def repaint(
         larger = picture[above + 2 * row : above + 2 * bottom, beside + 2 * column : beside + 2 * right]
         above = 0 if level == 1 else above + (height >> (level - 1))
         beside = width
-        size = right - column, bottom - row
-        picture[above + row : above + bottom, beside + column : beside + right] = cv2.resize(
-            larger, size, interpolation=cv2.INTER_AREA
-        )
+        smaller = cv2.resize(larger, (right - column, bottom - row), interpolation=cv2.INTER_AREA)
+        picture[above + row : above + bottom, beside + column : beside + right] = smaller

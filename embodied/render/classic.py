@@ -200,20 +200,20 @@ class Renderer:
         Where the CPU draws a lit house, an id is of a point up to a third of a pixel beside the middle: it tells at
         edges.
         """
-        drawing, chosen = self._open(), self._chosen(camera, size)
+        drawing, chosen = self._open(), np.flatnonzero(self._in_view(camera, size))
         picture, depth, ids = drawing.view(camera, size, self._drawn_size(size), chosen)
         return View(self._overlaid(averaged(picture, size), camera), cv2.flip(depth, 0), cv2.flip(ids, 0))
 
     @gl.drawing()
     def rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         """(h, w, 3) uint8: colours alone."""
-        picture = self._open().rgb(camera, self._drawn_size(size), self._chosen(camera, size))
+        picture = self._open().rgb(camera, self._drawn_size(size), np.flatnonzero(self._in_view(camera, size)))
         return self._overlaid(averaged(picture, size), camera)
 
     @gl.drawing()
     def depth_and_ids(self, camera: Camera, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
         """(h, w) float32 metres along the optical axis and (h, w) int32, without the colours."""
-        depth, ids = self._open().depth_and_ids(camera, size, self._chosen(camera, size))
+        depth, ids = self._open().depth_and_ids(camera, size, np.flatnonzero(self._in_view(camera, size)))
         return cv2.flip(depth, 0), cv2.flip(ids, 0)
 
     @gl.drawing()
@@ -254,12 +254,8 @@ class Renderer:
             raise RuntimeError("the renderer is closed; make a new one")
         return self._drawing
 
-    def _chosen(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
-        """The numbers of the geoms to draw."""
-        return np.flatnonzero(self._in_view(camera, size))
-
     def _in_view(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
-        """(ngeom,) bool: what may be seen: through doors and windows, with its box in the field of view."""
+        """(ngeom,) bool: drawn and maybe seen: through doors and windows, with its box in the field of view."""
         drawing = self._open()
         forward, up = np.array(camera.forward), np.array(camera.up)
         right, tall = camera.right, math.tan(camera.vfov / 2)

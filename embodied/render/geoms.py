@@ -89,8 +89,9 @@ class Geoms:
         owner_of_number[1:] = self._scene.owner_of_geom[chosen]
         packed = cv2.cvtColor(numbers, cv2.COLOR_RGB2RGBA).view("<u4")[..., 0] & 0xFFFFFF
         ids = owner_of_number.take(packed)
-        depth = depth_of_reversed_z(reversed_z)
-        depth[ids == 0] = np.inf  # a painted sky is no thing
+        # glFrustum's mapping with both ends exchanged, inverted (OpenGL 2.1 reference, glFrustum): 0 at FAR_PLANE
+        depth = NEAR_PLANE * FAR_PLANE / (NEAR_PLANE + reversed_z * np.float32(FAR_PLANE - NEAR_PLANE))
+        depth[(reversed_z <= 0) | (ids == 0)] = np.inf  # a painted sky is no thing
         return depth, ids
 
     def view(
@@ -134,13 +135,3 @@ def world_boxes(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray,
     axes = data.geom_xmat.reshape(-1, 3, 3)
     middles = data.geom_xpos + np.einsum("gij,gj->gi", axes, model.geom_aabb[:, :3])
     return middles, np.einsum("gij,gj->gi", np.abs(axes), model.geom_aabb[:, 3:])
-
-
-def depth_of_reversed_z(z: np.ndarray) -> np.ndarray:
-    """Metres along the optical axis (float32) from a depth buffer that is 1 at NEAR_PLANE and 0 at FAR_PLANE; inf at 0.
-
-    Source: the inverse of glFrustum's mapping with both ends exchanged (OpenGL 2.1 reference, glFrustum).
-    """
-    depth = NEAR_PLANE * FAR_PLANE / (NEAR_PLANE + z * np.float32(FAR_PLANE - NEAR_PLANE))
-    depth[z <= 0] = np.inf
-    return depth

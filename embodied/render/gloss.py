@@ -420,8 +420,7 @@ class _Seen:
 
     def of(self, which: np.ndarray) -> _Seen:
         """Some of them."""
-        names = ("pixel", "face", "distance", "ahead", "normal", "roughness", "rough", "sharp", "which")
-        return _Seen(*(getattr(self, name)[which] for name in names))
+        return _Seen(**{name: values[which] for name, values in vars(self).items()})
 
 
 def _twice(a: np.ndarray, way: int = cv2.INTER_NEAREST) -> np.ndarray:
@@ -559,11 +558,17 @@ def _glowing(mesh: LitMesh, glow: np.ndarray | None) -> np.ndarray:
     """(m,) bool: faces that give light of their own, beside which what they mirror is nothing."""
     if glow is None:
         return np.zeros(len(mesh.faces), bool)
-    h, w = glow.shape[:2]
     corners = mesh.uv[mesh.faces]
     at = np.concatenate([corners, corners.mean(1, keepdims=True)], axis=1)
-    x, y = (np.clip(at[..., k] * n, 0, n - 1).astype(int) for k, n in ((0, w), (1, h)))
-    return glow[y, x].max((1, 2)) > 0
+    return texels_at(glow, at).max((1, 2)) > 0
+
+
+def texels_at(picture: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """(..., c) values of a picture (h, w, c) at places (..., 2) of it, v down."""
+    h, w = picture.shape[:2]
+    x, y = (np.clip(uv[..., k] * n, 0, n - 1).astype(int) for k, n in ((0, w), (1, h)))
+    values: np.ndarray = picture[y, x]
+    return values
 
 
 def _nearer(first: Rays, second: Rays, count: int) -> Rays:

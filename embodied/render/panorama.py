@@ -271,8 +271,11 @@ def pad_grid(s: int) -> Pad:
     forward, right, up = AXES[face].swapaxes(0, 1)
     rays = forward + u[:, None] * right - v[:, None] * up
     lengths = np.linalg.norm(rays, axis=-1)
-    other, ou, ov, along = _face_coordinates(rays / lengths[:, None])
-    x, y = (np.clip((w + 1) / 2 * s - 0.5, 0, s - 1) for w in (ou, ov))
+    rays = rays / lengths[:, None]
+    forward, right, up = AXES.swapaxes(0, 1)
+    other = np.argmax(rays @ forward.T, axis=-1)
+    along, u, v = (np.sum(rays * axes[other], axis=-1) for axes in (forward, right, -up))
+    x, y = (np.clip((w / along + 1) / 2 * s - 0.5, 0, s - 1) for w in (u, v))
     return Pad(
         face,
         row,
@@ -281,14 +284,6 @@ def pad_grid(s: int) -> Pad:
         (y + 1 + other * (s + 2)).astype(np.float32)[:, None],
         (along * lengths).astype(np.float32),
     )
-
-
-def _face_coordinates(rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Face index, u (right) and v (down) in [-1, 1], and the part of each unit ray along the face's axis."""
-    forward, right, up = AXES.swapaxes(0, 1)
-    face = np.argmax(rays @ forward.T, axis=-1)
-    along, u, v = (np.sum(rays * axes[face], axis=-1) for axes in (forward, right, -up))
-    return face, u / along, v / along, along
 
 
 @functools.lru_cache(maxsize=8)

@@ -154,7 +154,7 @@ class PanoramaFile:
                 f"{self.path}: the {channel} of node {node} is no picture of its size; "
                 "delete the file, it is made again"
             )
-        faces = _apart(picture)
+        faces = np.stack(np.split(picture, 6, axis=1))
         if channel == "rgb":
             return faces
         if channel == "ids":
@@ -233,10 +233,6 @@ def _encoded(kind: str, image: np.ndarray, *options: int) -> bytes:
 def beside(faces: np.ndarray) -> np.ndarray:
     """(6, s, s, ...) faces next to each other: (s, 6 s, ...)."""
     return np.ascontiguousarray(np.concatenate(list(faces), axis=1))
-
-
-def _apart(strip: np.ndarray) -> np.ndarray:
-    return np.stack(np.split(strip, 6, axis=1))
 
 
 def _read_index(f: BinaryIO, path: Path) -> PanoramaIndex:

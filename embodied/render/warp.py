@@ -107,9 +107,10 @@ class WarpRenderer:
             self._model = mjw.put_model(model)
             self._data = mjw.put_data(model, data, nworld=worlds)
             self._context = context = _context(model, worlds, size)
+            flag = lambda on: wp.array([on], dtype=bool)
             self._passes = {
                 (rgb, rest): dataclasses.replace(
-                    context, render_rgb=_flag(rgb), render_depth=_flag(rest), render_seg=_flag(rest)
+                    context, render_rgb=flag(rgb), render_depth=flag(rest), render_seg=flag(rest)
                 )
                 for rgb, rest in ((True, True), (True, False), (False, True))
             }
@@ -251,10 +252,6 @@ def _context(model: mujoco.MjModel, worlds: int, size: tuple[int, int]) -> Any:
     context.textures = wp.array(context.textures_registry, dtype=wp.Texture2D)
     context.znear, context.zfar = NEAR_PLANE, FAR_PLANE  # part of the compiled kernel, so one for all houses
     return context
-
-
-def _flag(on: bool) -> Any:
-    return wp.array([on], dtype=bool)
 
 
 def _compiled(

@@ -40,7 +40,8 @@ def body_parts(
     for body in range(1, model.nbody):
         name = body_name(model, body)
         first, count = model.body_geomadr[body], model.body_geomnum[body]
-        geoms = [g for g in range(first, first + count) if model.geom_group[g] in groups and _alpha(model, g) > 0]
+        every = range(first, first + count)
+        geoms = [g for g in every if model.geom_group[g] in groups and geom_color(model, g)[3] > 0]
         free = [g for g in geoms if not (model.geom_contype[g] or model.geom_conaffinity[g])]
         parts = [p for g in free or geoms if (p := _part(model, g, name, textures)) is not None]
         if parts:
@@ -60,10 +61,6 @@ def body_poses(model: mujoco.MjModel, data: mujoco.MjData, names: Collection[str
         if (name := body_name(model, body)) in wanted:
             poses[name] = RigidPose(tuple(data.xpos[body].tolist()), tuple(data.xquat[body].tolist()))
     return poses
-
-
-def _alpha(model: mujoco.MjModel, geom: int) -> float:
-    return float(geom_color(model, geom)[3])
 
 
 def geom_color(model: mujoco.MjModel, geom: int) -> np.ndarray:
@@ -143,17 +140,14 @@ def _finish(model: mujoco.MjModel, geom: int, textures: Path) -> Finish:
     shine = float(model.mat_shininess[material])
     texture = int(model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB])
     flat = texture >= 0 and model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
+    is_mesh = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH
+    laid_on = flat and is_mesh and model.mesh_texcoordnum[model.geom_dataid[geom]] > 0
     return Finish(
         color=(red, green, blue, alpha),
-        texture=_texture(model, texture, textures) if flat and _has_coordinates(model, geom) else None,
+        texture=_texture(model, texture, textures) if laid_on else None,
         roughness=float(np.clip(1 - shine, 0.2, 1.0)),
         specular=float(model.mat_specular[material]) * 0.5,
     )
-
-
-def _has_coordinates(model: mujoco.MjModel, geom: int) -> bool:
-    mesh = int(model.geom_dataid[geom])
-    return bool(model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH and model.mesh_texcoordnum[mesh] > 0)
 
 
 def _texture(model: mujoco.MjModel, texture: int, folder: Path) -> str:

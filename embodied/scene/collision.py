@@ -77,11 +77,8 @@ def kept_boxes(
     """`object_boxes`, kept on disk under what they depend on, code included; nonsense in a file is made again."""
     surfaces = [dataclasses.astuple(s) for s in asset.surfaces]
     meshes = [array.tobytes() for p in parts for array in (p.vertices, p.faces)]
-    path = (
-        Path(cache)
-        / "collision"
-        / f"{digest(code_digest(__name__, without=UNCOUNTED_MODULES), surfaces, asset.size, size, *meshes)[:32]}.json"
-    )
+    key = digest(code_digest(__name__, without=UNCOUNTED_MODULES), surfaces, asset.size, size, *meshes)[:32]
+    path = Path(cache) / "collision" / f"{key}.json"
     try:
         rows = np.array(parse_file(path), float).reshape(-1, 7)
         if np.isfinite(rows).all() and (rows[:, 3:6] > 0).all():
@@ -115,18 +112,19 @@ def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, flo
         slabs.append((np.append(low[:2], bottom), np.append(high[:2], max(low[2], bottom + 2 * THINNEST))))
     if not len(points):
         return tuple(_box(low, high) for low, high in slabs)
-    if not slabs and (max(size) < ONE_BOX or is_solid(points)):
-        return (_box(points.min(axis=0), points.max(axis=0)),)
+    whole = points.min(axis=0), points.max(axis=0)
+    if not slabs and (max(size) < ONE_BOX or _volume(grid_boxes(points, 5)) > 0.97 * _volume([whole])):  # a crate
+        return (_box(*whole),)
     cut = sorted({round(float(high[2]), 4) + 1e-6 for _, high in slabs} | set(levels(parts)))
     for n in GRID_CELLS:
         bounds = grid_boxes(points, n, cut, MOST_BOXES)
         if len(bounds) <= MOST_BOXES:
             break
     else:
-        bounds = [(points.min(axis=0), points.max(axis=0))]
+        bounds = [whole]
     for low, high in free:
         bounds = [piece for b in bounds for piece in without(b, (low, high))]
-    return tuple(_box(low, high, points.min(axis=0)) for low, high in (*slabs, *bounds))
+    return tuple(_box(low, high, whole[0]) for low, high in (*slabs, *bounds))
 
 
 def surface_points(parts: Sequence[MeshPart], n: int = 6000) -> np.ndarray:
@@ -182,11 +180,8 @@ def levels(parts: Sequence[MeshPart]) -> tuple[float, ...]:
     return tuple(float(mean[i] + 1e-5 * keys[1, i]) for i in large if areas[i] > 0.1 * outline)
 
 
-def is_solid(points: np.ndarray) -> bool:
-    """True if a thing all but fills its bounding box: a cupboard, a crate."""
-    boxes = grid_boxes(points, 5)
-    filled = sum(float(np.prod(high - low)) for low, high in boxes)
-    return filled > 0.97 * float(np.prod(points.max(axis=0) - points.min(axis=0)))
+def _volume(boxes: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
+    return sum(float(np.prod(high - low)) for low, high in boxes)
 
 
 def grid_boxes(

@@ -373,11 +373,8 @@ class _Looks:
             )
             if finish.texture:
                 material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = self._texture(finish.texture)
-        alpha = float(finish.color[3])
-        if finish.texture:
-            return self._materials[key], (1.0, 1.0, 1.0, alpha)
-        red, green, blue = (float(c) for c in finish.color[:3])
-        return self._materials[key], (red, green, blue, alpha)
+        red, green, blue = (1.0 if finish.texture else float(c) for c in finish.color[:3])
+        return self._materials[key], (red, green, blue, float(finish.color[3]))
 
     def _texture(self, path: str) -> str:
         if path not in self._textures:
@@ -444,7 +441,8 @@ def _lit_pieces(
     if m.owner not in frames:
         return [(m, None)]
     frame, carrier = frames[m.owner]
-    vertices = _unturned(m.vertices - np.array(frame.position, np.float32), frame.yaw)
+    vertices = m.vertices - np.array(frame.position, np.float32)
+    vertices[:, :2] = vertices[:, :2] @ rotation(frame.yaw).astype(np.float32)
     return [(dataclasses.replace(m, vertices=vertices), carrier)]
 
 
@@ -462,12 +460,6 @@ def _add_insides(spec: mujoco.MjSpec, cases: Mapping[str, Case]) -> None:
             name, rgba = f"inside_{k}_{axis}", (*(INSIDE_DIM[axis] * color).tolist(), float(finish.color[3]))
             _add_mesh(spec, name, mesh.vertices, mesh.normals, mesh.uv, mesh.faces[way == axis])
             _draw(carrier.body, f"{part.owner}#{name}", name, PROBE_LIT, rgba, pos=carrier.origin)
-
-
-def _unturned(vertices: np.ndarray, yaw: float) -> np.ndarray:
-    out = vertices.copy()
-    out[:, :2] = vertices[:, :2] @ rotation(yaw).astype(np.float32)
-    return out
 
 
 def drawn_meshes(lit: LitPages, house: House) -> Iterator[tuple[int, LitMesh]]:

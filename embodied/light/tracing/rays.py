@@ -12,7 +12,7 @@ import numpy as np
 from embodied.light.backend import dr, mi, scene_of, vector
 from embodied.light.pages.colours import linear
 from embodied.light.pages.files import Bake
-from embodied.render.gloss import GlossData
+from embodied.render.gloss import GlossData, texels_at
 
 if TYPE_CHECKING:
     from embodied.render.gloss import Rays
@@ -72,11 +72,7 @@ def gloss_data_of(bake: Bake) -> GlossData:
         if shine is None or not shine[:, 2].any():
             tint.append(None)
             continue
-        picture = albedo(mesh.page)
-        h, w = picture.shape[:2]
-        at = mesh.uv[mesh.faces].mean(1)
-        x, y = (np.clip(at[:, k] * n, 0, n - 1).astype(int) for k, n in ((0, w), (1, h)))
-        tint.append(linear(picture[y, x] / 255.0))
+        tint.append(linear(texels_at(albedo(mesh.page), mesh.uv[mesh.faces].mean(1)) / 255.0))
     exposure = bake.exposure
     outdoors = exposure.outdoors.astype(np.float32)
     return GlossData(gloss, tint, glow, exposure.near, outdoors, float(np.median(exposure.gains)), detail)
