@@ -1,4 +1,4 @@
-"""What hangs in a room: curtains, radiators, lamps, switches, sockets, pictures, mirrors and wall televisions.
+"""Things that hang in a room: curtains, radiators, lamps, switches, sockets, pictures, mirrors and wall televisions.
 
 Pictures come over furniture first, then on what is left of free wall; what else hangs is in smalls.toml.
 """
