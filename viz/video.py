@@ -68,8 +68,7 @@ def camera_track(
 def _ease(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Frames from a (left out) to b, slow at both ends."""
     seconds = max(np.linalg.norm(b[:3] - a[:3]) / WALK, abs(b[3] - a[3]) / TURN, abs(b[4] - a[4]) / TURN)
-    n = int(np.ceil(seconds * FPS))
-    t = np.linspace(0, 1, n + 1)[1:, None]
+    t = np.linspace(0, 1, int(np.ceil(seconds * FPS)) + 1)[1:, None]
     return a + (b - a) * (t * t * (3 - 2 * t))
 
 

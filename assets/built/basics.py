@@ -170,8 +170,7 @@ def low_cabinet(spec: BuildRequest) -> list[MeshPart]:
     foot = 0.1
     wood = [box([-w / 2, -d / 2 + 0.02, foot], [w / 2, d / 2, h], 0.003)]
     wood += [cylinder(0.018, 0, foot).moved(x, y) for x in _edges(w, 0.12) for y in _edges(d, 0.12)]
-    count = max(2, round(w / 0.5))
-    edges, grips = np.linspace(-w / 2, w / 2, count + 1), []
+    edges, grips = np.linspace(-w / 2, w / 2, max(2, round(w / 0.5)) + 1), []
     for k, (a, b) in enumerate(zip(edges, edges[1:])):
         wood.append(box([a + 0.003, -d / 2, foot + 0.012], [b - 0.003, -d / 2 + 0.02, h - 0.02], 0.002))
         grips.append(handle(b - 0.05 if k % 2 == 0 else a + 0.05, (h + foot) / 2, -d / 2, upright=True))

@@ -243,8 +243,7 @@ def bin_(spec: BuildRequest) -> list[MeshPart]:
     for k in range(5):
         a, q = 2.4 * k + rng.uniform(0, 1), r * low * (0.45 if k else 0.0)
         lump = ball(0.04, 10, 7)
-        dents = rng.normal(1.0, 0.13, (len(lump.vertices), 1))
-        lump = _faceted(lump.vertices * dents, lump.faces)
+        lump = _faceted(lump.vertices * rng.normal(1.0, 0.13, (len(lump.vertices), 1)), lump.faces)
         paper.append(lump.moved(q * np.cos(a), q * np.sin(a), 0.04 + 0.03 * (k % 3)))
     return parts_of((main, [s.scaled(1, d / w, 1) for s in (shell, edge)]), ("paper", paper))
 

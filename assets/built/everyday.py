@@ -98,8 +98,7 @@ def note(spec: BuildRequest) -> list[MeshPart]:
         marks = [(plain((0.2, 0.2, 0.28), 0.9), ink)]
     pin = ball(0.006, 8, 5).scaled(1, 0.6, 1).moved(0, d / 2 - 0.004, h * 0.965)
     head = plain(TINTS[("red", "blue", "green", "yellow")[int(rng.integers(4))]], 0.35)
-    paper = plain(_tint(spec, "paper"), 0.9, specular=0.2)
-    return parts_of((paper, leaf), (head, pin), *marks)
+    return parts_of((plain(_tint(spec, "paper"), 0.9, specular=0.2), leaf), (head, pin), *marks)
 
 
 def notice_board(spec: BuildRequest) -> list[MeshPart]:
@@ -182,8 +181,7 @@ def cable(spec: BuildRequest) -> list[MeshPart]:
     end = path[-1]
     plug = box([-0.014, -0.02, 0], [0.014, 0.02, h], 0.004).moved(end[0], end[1])
     tip = box([-0.004, -0.012, 0], [0.004, 0.012, 0.006], 0.001).moved(*path[0, :2])
-    skin = plain(_tint(spec), 0.45)
-    return parts_of((skin, [tube(path, 0.0022, 6), plug]), ("steel", tip))
+    return parts_of((plain(_tint(spec), 0.45), [tube(path, 0.0022, 6), plug]), ("steel", tip))
 
 
 # ------------------------------------------------------------------ cloth

@@ -174,8 +174,7 @@ def _level_grip(x: float, z: float, y: float, length: float) -> Shape:
     """The round bar of an oven's door on two feet."""
     bar = tube([(x - length / 2, y - 0.026, z), (x + length / 2, y - 0.026, z)], 0.0075, 10)
     ends = (x + s * (length / 2 - 0.03) for s in (-1, 1))
-    feet = [tube([(at, y, z), (at, y - 0.026, z)], 0.006, 8) for at in ends]
-    return joined(bar, *feet)
+    return joined(bar, *[tube([(at, y, z), (at, y - 0.026, z)], 0.006, 8) for at in ends])
 
 
 def _knob() -> Shape:
@@ -254,8 +253,7 @@ def tall_cabinet(spec: BuildRequest) -> list[MeshPart]:
     y = -d / 2 + 0.002
     style, grip = spec.word("style", "flat"), spec.word("handle", "bar")
     cut = PLINTH[0] + 0.72
-    columns = max(1, round(w / 0.6))
-    edges = np.linspace(-w / 2, w / 2, columns + 1)
+    edges = np.linspace(-w / 2, w / 2, max(1, round(w / 0.6)) + 1)
     rows = ((PLINTH[0], cut), (cut, h))
     doors = [front(a, b, z0, z1, y, style) for a, b in itertools.pairwise(edges) for z0, z1 in rows]
     grips = [handle(b - 0.04, z, y, _on_door(grip), True) for b in edges[1:] for z in (cut - 0.12, cut + 0.2)]
@@ -371,8 +369,7 @@ def island(spec: BuildRequest) -> list[MeshPart]:
     bw, back = w - 0.06, d / 2 - min(0.28, d * 0.3)
     y, z0, z1 = -d / 2 + 0.03, PLINTH[0], h - 0.045
     style, grip = spec.word("style", "flat"), spec.word("handle", "bar")
-    columns = max(2, round(bw / 0.55))
-    edges = np.linspace(-bw / 2, bw / 2, columns + 1)
+    edges = np.linspace(-bw / 2, bw / 2, max(2, round(bw / 0.55)) + 1)
     doors, grips = [], []
     for k, (a, b) in enumerate(itertools.pairwise(edges)):
         if k % 2:

@@ -222,8 +222,7 @@ def radiator(spec: BuildRequest) -> list[MeshPart]:
     grille: list[Shape] = []
     pipe: list[Shape] = []
     if spec.params.get("kind") == "columns":
-        count = max(4, round(w / 0.055))
-        for x in np.linspace(-w / 2 + 0.022, w / 2 - 0.022, count):
+        for x in np.linspace(-w / 2 + 0.022, w / 2 - 0.022, max(4, round(w / 0.055))):
             for y in (-d * 0.28, d * 0.28):
                 made.append(tube([(x, y, 0.03), (x, y, h - 0.03)], 0.0125, 8, caps=False))
             for z in (0.03, h - 0.03):

@@ -111,8 +111,7 @@ def quads(corners: ArrayLike, uv: np.ndarray | None = None) -> Shape:
     """Flat quadrilaterals (m, 4, 3), counter-clockwise; uv (m, 4, 2) metres or projected along the face."""
     p = np.asarray(corners, float).reshape(-1, 4, 3)
     normals = _unit(np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]))
-    m = len(p)
-    base = 4 * np.arange(m)[:, None]
+    base = 4 * np.arange(len(p))[:, None]
     faces = np.concatenate([base + [0, 1, 2], base + [0, 2, 3]], axis=1).reshape(-1, 3)
     vertices, normals = p.reshape(-1, 3), np.repeat(normals, 4, axis=0)
     uv = projected_uv(vertices, normals) if uv is None else np.asarray(uv, float).reshape(-1, 2)
@@ -149,8 +148,7 @@ def projected_uv(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
 def flat(polygon: shapely.Geometry, z: float = 0.0, up: bool = True) -> Shape:
     """A horizontal polygon (holes allowed) at height z, facing up or down; uv = x, y in metres."""
     shape_points: list[np.ndarray] = []
-    triangles = shapely.constrained_delaunay_triangles(polygon)
-    for t in shapely.get_parts(triangles):
+    for t in shapely.get_parts(shapely.constrained_delaunay_triangles(polygon)):
         ring = np.asarray(t.exterior.coords)[:3]
         a, b, c = ring
         if abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) < 1e-12:
@@ -303,8 +301,7 @@ def lathe(profile: ArrayLike, segments: int = 24, crease: float = 0.7) -> Shape:
     the inside. Corners sharper than `crease` radians get split normals.
     """
     p = np.asarray(profile, float)
-    keep = np.concatenate([[True], np.linalg.norm(np.diff(p, axis=0), axis=1) > 1e-7])
-    p = p[keep]
+    p = p[np.concatenate([[True], np.linalg.norm(np.diff(p, axis=0), axis=1) > 1e-7])]
     d = np.diff(p, axis=0)
     d /= np.linalg.norm(d, axis=1, keepdims=True)
     outward = np.stack([d[:, 1], -d[:, 0]], axis=1)
@@ -390,8 +387,7 @@ def tube(path: ArrayLike, radius: ArrayLike, segments: int = 8, closed: bool = F
         return shape
     ends = []
     for i, sign in ((0, -1.0), (k - 1, 1.0)):
-        ring = vertices[i, :-1]
-        rim = np.concatenate([p[i][None], ring])
+        rim = np.concatenate([p[i][None], vertices[i, :-1]])
         j = np.arange(segments)
         f = np.stack([np.zeros(segments, int), 1 + j, 1 + (j + 1) % segments], axis=1)
         n = np.tile(tangent[i] * sign, (len(rim), 1))
@@ -418,8 +414,7 @@ def sheet(points: np.ndarray, thickness: float = 0.0) -> Shape:
     if thickness <= 0:
         return front
     q = p - normals * thickness
-    back = _grid(q, normals, uv).reversed()
-    return joined(front, back, between(rim(q), rim(p)))
+    return joined(front, _grid(q, normals, uv).reversed(), between(rim(q), rim(p)))
 
 
 def rim(grid: np.ndarray) -> np.ndarray:

@@ -67,8 +67,7 @@ def curtain(spec: BuildRequest) -> list[MeshPart]:
     (w, d, h), rng = spec.size, spec.rng
     cloth = spec.material("cloth", "linen/0")
     rod_z = h - 0.03
-    open_to = float(spec.params.get("drawn", 0.30))
-    panel = w * open_to * 0.5 + 0.10
+    panel = w * float(spec.params.get("drawn", 0.30)) * 0.5 + 0.10
     parts, hooks = [], []
     around = [(0, 0.019 * np.cos(t), 0.019 * np.sin(t)) for t in np.linspace(0, 2 * np.pi, 12, endpoint=False)]
     ring = tube(around, 0.0022, 5, closed=True)
@@ -171,8 +170,7 @@ def _folded_leaf(w: float, d: float, t: float, outer: bool, *, rng: np.random.Ge
     along_x, along_y = 2.5 * share[:, None] + rng.uniform(0, 6), 9 * core[None, :, 0] / d + rng.uniform(0, 6)
     sag = 0.05 * t * np.sin(along_x) * np.sin(along_y)
     x = share[:, None] * w / 2 + 0.004 * np.sin(14 * core[None, :, 0] / d + rng.uniform(0, 6)) * np.abs(share[:, None])
-    grid = np.stack(np.broadcast_arrays(x, section[..., 0], section[..., 1] + t / 2 + sag), -1)
-    leaf = sheet(grid)
+    leaf = sheet(np.stack(np.broadcast_arrays(x, section[..., 0], section[..., 1] + t / 2 + sag), -1))
     a, b, c = (leaf.vertices - np.mean(leaf.vertices, axis=0))[leaf.faces.T]
     volume = np.einsum("ij,ij->", a, np.cross(b, c))
     return leaf if volume > 0 else leaf.reversed()

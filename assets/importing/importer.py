@@ -405,8 +405,7 @@ def _turned_out(
     rim = (counts[which.reshape(-1)].reshape(-1, 3) != 2).any(axis=1)
     is_open = np.zeros(piece.max() + 1, bool)
     is_open[piece[rim]] = True
-    middle = points[faces].reshape(-1, 3).mean(axis=0)
-    volume = np.bincount(piece, np.linalg.det(points[faces] - middle))
+    volume = np.bincount(piece, np.linalg.det(points[faces] - points[faces].reshape(-1, 3).mean(axis=0)))
     inside_out = (~is_open & (volume < 0))[piece]
     faces = np.where(inside_out[:, None], faces[:, ::-1], faces)
     if uv is not None:

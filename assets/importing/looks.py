@@ -165,8 +165,7 @@ def _cloth(on: Canvas) -> np.ndarray:
 
 
 def _bedding(on: Canvas) -> np.ndarray:
-    cloth = _threads(on, 0.02) * folds(on, 0.18, 0.065) * folds(on, 0.05, 0.025)
-    return cloth[..., None]
+    return (_threads(on, 0.02) * folds(on, 0.18, 0.065) * folds(on, 0.05, 0.025))[..., None]
 
 
 def _leather(on: Canvas) -> np.ndarray:
@@ -185,8 +184,7 @@ def _terry(on: Canvas) -> np.ndarray:
 
 
 def _chipboard(on: Canvas) -> np.ndarray:
-    chips = on.noise(5, 2) + on.noise(2, 5)
-    return (1 + 0.05 * chips + 0.03 * on.noise(1, 1))[..., None]
+    return (1 + 0.05 * (on.noise(5, 2) + on.noise(2, 5)) + 0.03 * on.noise(1, 1))[..., None]
 
 
 COVERS = {
@@ -307,8 +305,7 @@ def laid_on(cover: str, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     shift = np.zeros((len(faces), 2))
     if made.grained:
         board = _boards(faces, unit)
-        longest = _longest(vertices, faces, board)[board]
-        turned = longest == v_axis
+        turned = _longest(vertices, faces, board)[board] == v_axis
         u_axis, v_axis = np.where(turned, v_axis, u_axis), np.where(turned, u_axis, v_axis)
         shift = np.random.default_rng(0).random((board.max() + 1, 2))[board]
     corners = vertices[faces]

@@ -37,8 +37,7 @@ def sound_faces(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
         [np.linalg.norm(vertices[faces[:, i]] - vertices[faces[:, i - 1]], axis=1) for i in range(3)], axis=0
     )
     keep = area > 1e-6 * np.maximum(longest, 1e-9) ** 2
-    start = np.argmin(faces, axis=1)
-    turned = np.take_along_axis(faces, (start[:, None] + [0, 1, 2]) % 3, axis=1)
+    turned = np.take_along_axis(faces, (np.argmin(faces, axis=1)[:, None] + [0, 1, 2]) % 3, axis=1)
     _, first = np.unique(turned, axis=0, return_index=True)
     unique = np.zeros(len(faces), dtype=bool)
     unique[first] = True

@@ -176,8 +176,7 @@ def _split(
     row, corner = row[order], corner[order]
     spots = None
     if uv is not None:
-        six = np.concatenate([uv, (uv + np.roll(uv, -1, axis=1)) / 2], axis=1)
-        spots = six[row[:, None], corner]
+        spots = np.concatenate([uv, (uv + np.roll(uv, -1, axis=1)) / 2], axis=1)[row[:, None], corner]
     return np.concatenate([vertices, middles]), halves[row[:, None], corner], spots
 
 

@@ -190,5 +190,4 @@ def _outline(opacity: bytes, width: int, height: int, least: float) -> shapely.G
         for i, ring in enumerate(rings)
         if parents[i] < 0 and len(ring) > 2
     ]
-    shape = shapely.union_all(polygons)
-    return shapely.make_valid(shape).intersection(shapely.box(0, 0, 1, 1))
+    return shapely.make_valid(shapely.union_all(polygons)).intersection(shapely.box(0, 0, 1, 1))

@@ -142,8 +142,7 @@ def botanical(on: Canvas, ground: Color, ink: Color, fern: bool = True) -> Maps:
     rng = on.rng
     image = _canvas(on, ground)
     t = np.linspace(0, 1, 50)
-    bend = rng.uniform(-0.10, 0.10)
-    stem = np.stack([0.5 + bend * np.sin(np.pi * t * 0.8), 0.86 - 0.70 * t], 1)
+    stem = np.stack([0.5 + rng.uniform(-0.10, 0.10) * np.sin(np.pi * t * 0.8), 0.86 - 0.70 * t], 1)
     image = _stroke(image, stem, 0.005, ink)
     pairs = 15 if fern else 7
     for k in range(pairs):
@@ -211,8 +210,7 @@ def still_life(on: Canvas, ground: Color, table: Color, fruit: Colors) -> Maps:
         r = rng.uniform(0.06, 0.085)
         d = np.hypot(x - cx, y - cy) / r
         light = np.clip(0.35 + 0.75 * (1 - np.hypot(x - cx + 0.4 * r, y - cy + 0.45 * r) / (1.5 * r)), 0.15, 1.2)
-        c = rgb(fruit[k % len(fruit)])
-        image = mix(image, c * light[..., None], 1 - smooth_step(d, 0.95, 1.02))
+        image = mix(image, rgb(fruit[k % len(fruit)]) * light[..., None], 1 - smooth_step(d, 0.95, 1.02))
     bowl = ((x - 0.5) / 0.30) ** 2 + ((y - 0.60) / 0.17) ** 2
     inside = (1 - smooth_step(bowl, 0.97, 1.03)) * smooth_step(y, 0.60, 0.606)
     image = mix(image, rgb((0.62, 0.66, 0.70)) * (1.05 - 0.9 * np.abs(x - 0.42))[..., None], inside)
@@ -311,8 +309,7 @@ def berber(on: Canvas, ground: Color, line: Color, diamonds: int = 3) -> Maps:
     y, x = on.shares()
     wob = 0.006 * on.fbm(3, 40, 1.4)
     f = np.minimum(*(np.abs(((x * diamonds * 1.5 + s * y * diamonds + wob * 4) % 1) - 0.5) for s in (1, -1)))
-    image = mix(on.rgb(ground), rgb(line), 1 - smooth_step(f, 0.018, 0.032))
-    return _pile(on, image, 0.13)
+    return _pile(on, mix(on.rgb(ground), rgb(line), 1 - smooth_step(f, 0.018, 0.032)), 0.13)
 
 
 def bordered(on: Canvas, field: Color, border: Color, bands: tuple[tuple[float, float], ...] = ((0.0, 0.09),)) -> Maps:
@@ -339,10 +336,8 @@ def striped(on: Canvas, colors: Colors, count: int = 14) -> Maps:
     """Cross stripes of several widths."""
     n = on.n
     widths = on.rng.uniform(0.4, 1.6, count)
-    edges = np.cumsum(widths) / widths.sum()
-    band = np.searchsorted(edges, (np.arange(n) + 0.5) / n)
-    image = np.broadcast_to(rgb(colors)[band % len(colors)][None], (n, n, 3)).copy()
-    return _pile(on, image, 0.06)
+    band = np.searchsorted((np.cumsum(widths) / widths.sum()), (np.arange(n) + 0.5) / n)
+    return _pile(on, np.broadcast_to(rgb(colors)[band % len(colors)][None], (n, n, 3)).copy(), 0.06)
 
 
 def rings(on: Canvas, colors: Colors, count: int = 9) -> Maps:

@@ -110,8 +110,7 @@ def marble(at: Places, base: Color, vein: Color, amount: float = 0.7) -> Face:
     strong = np.exp(-((wide / 0.045) ** 2)) * (0.25 + 0.75 * presence) + 0.35 * np.exp(-wide / 0.22)
     faint = 0.45 * np.exp(-((thin / 0.05) ** 2)) * presence
     t = np.clip(amount * (0.75 * strong + faint) + 0.06 * cloud, 0, 1)
-    color = mix(rgb(base) * (1 + 0.012 * cloud)[..., None], rgb(vein), t)
-    return color, 0.02 * t
+    return mix(rgb(base) * (1 + 0.012 * cloud)[..., None], rgb(vein), t), 0.02 * t
 
 
 def slate(at: Places, base: Color, warm: Color = (0.40, 0.34, 0.28), rust: float = 0.25) -> Face:
@@ -162,8 +161,7 @@ def granite(on: Canvas, colors: Colors, weights: tuple[float, ...], grain: float
         edge = smooth_step(f - best, -0.08, 0.08)
         color = color * (1 - edge)[..., None] + shade * edge[..., None]
         best = np.maximum(best, f)
-    cloud = on.fbm(3, 12, 1.0)
-    color *= (1 + 0.03 * cloud)[..., None]
+    color *= (1 + 0.03 * on.fbm(3, 12, 1.0))[..., None]
     return maps_of(color, gloss, 0.01, 0.97)
 
 
@@ -193,8 +191,7 @@ def terrazzo(on: Canvas, base: Color, chips: Colors, size: float = 0.009, cover:
                 cv2.fillPoly(color, [np.round(p * 16).astype(np.int32)], tint, cv2.LINE_AA, 4)
         placed += 1.6 * r * r
     fine = on.noise(0.8, 0.8)
-    out = color.astype(np.float32) / 255 * (1 + 0.02 * fine)[..., None]
-    return maps_of(out, 0.22)
+    return maps_of((color.astype(np.float32) / 255 * (1 + 0.02 * fine)[..., None]), 0.22)
 
 
 def concrete(on: Canvas, base: Color = (0.60, 0.59, 0.57), contrast: float = 0.03, gloss: float = 0.75) -> Maps:
@@ -268,8 +265,7 @@ def rubble(on: Canvas, base: Color = (0.62, 0.57, 0.50), across: int = 5, mortar
         second = np.where(closer, first, np.minimum(second, d))
         owner = np.where(closer, k, owner)
         first = np.where(closer, d, first)
-    edge = (second - first) * tile / 2
-    face = smooth_step(edge, 0.004, 0.012)
+    face = smooth_step(((second - first) * tile / 2), 0.004, 0.012)
     tone = np.clip(rng.normal(0, 0.10, len(points)), -0.2, 0.2)
     hue = rng.normal(0, 0.03, (len(points), 1)) * [1.0, 0.3, -1.0]
     cloud, grain = on.fbm(5, 200, 1.1), on.noise(1, 1)

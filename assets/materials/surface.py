@@ -30,8 +30,7 @@ def plaster(on: Canvas, color: Color, relief: float = 1.0, mottle: float = 0.009
     """Trowelled lime plaster or roughcast: sweeps, grain, soft clouds."""
     sweep = on.fbm(5, 90, 1.2, 1.6)
     grain = on.noise(1.6, 1.6)
-    out = rgb(color) * (1 + mottle * sweep + 0.012 * relief * grain)[..., None]
-    return maps_of(out, 0.92)
+    return maps_of((rgb(color) * (1 + mottle * sweep + 0.012 * relief * grain)[..., None]), 0.92)
 
 
 def metal(on: Canvas, color: Color, rough: float = 0.28, brushed: float = 1.0, stain: float = 0.0) -> Maps:
@@ -51,8 +50,7 @@ def wicker(on: Canvas, color: Color, strands: int = 24) -> Maps:
     y = v / tile * strands + 0.5
     j = np.floor(y).astype(int)
     fy = y - j - 0.5
-    x = u / tile * (strands // 3)
-    over = np.cos(np.pi * (x + (j % 2)))
+    over = np.cos(np.pi * ((u / tile * (strands // 3)) + (j % 2)))
     bulge = np.cos(np.pi * fy) ** 0.7
     fibre = on.noise(12, 0.8)
     tone = on.rng.normal(0, 0.05, strands)[j % strands]
@@ -152,8 +150,7 @@ def damask(n: int, columns: int = 3, *, rng: np.random.Generator) -> list[np.nda
         for r in range(columns):
             centre = np.array([(c + 0.5 * (r % 2) * (columns % 2 == 0)) * w, r * w])
             for drop in (0, 1):
-                o = centre + ([0.5 * w, 0.5 * w] if drop else [0, 0])
-                _ornament(out, o, w, curls)
+                _ornament(out, (centre + ([0.5 * w, 0.5 * w] if drop else [0, 0])), w, curls)
     return [out.done()]
 
 

@@ -119,8 +119,7 @@ def sisal(on: Canvas, color: Color = (0.70, 0.61, 0.47), ribs: int = 64) -> Maps
     x = u / tile * ribs + 0.5 * (j % 2) + 0.15 * np.roll(swing, on.n // 3, 0)
     lump = np.cos(np.pi * (row - j - 0.5)) ** 0.6 * (0.6 + 0.4 * np.cos(2 * np.pi * x))
     tone = on.rng.normal(0, 0.02, ribs)[j % ribs] + 0.06 * on.noise(3, 1)
-    out = rgb(color) * (0.6 + 0.45 * lump + tone)[..., None]
-    return maps_of(out, 0.95, 0.02, 0.97)
+    return maps_of((rgb(color) * (0.6 + 0.45 * lump + tone)[..., None]), 0.95, 0.02, 0.97)
 
 
 def felt(on: Canvas, color: Color, mottle: float = 0.012, rough: float = 0.95, creases: float = 0.0) -> Maps:

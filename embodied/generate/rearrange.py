@@ -90,5 +90,4 @@ def _surface(carrier: Placement, name: str | None, catalogue: Catalogue) -> shap
         return None
     s, (kx, ky, _) = surfaces[0], np.array(carrier.size) / np.array(asset.size)
     corners = np.array([(s.x0, s.y0), (s.x1, s.y0), (s.x1, s.y1), (s.x0, s.y1)]) * (kx, ky)
-    area = shapely.Polygon(corners @ rotation(carrier.yaw).T + carrier.position[:2])
-    return area.buffer(-EDGE)
+    return shapely.Polygon(corners @ rotation(carrier.yaw).T + carrier.position[:2]).buffer(-EDGE)

@@ -213,8 +213,7 @@ def draw_sky(config: HouseConfig, house: House, *, rng: np.random.Generator) -> 
     living = [o for o in house.openings if o.rooms[1] is None and house.room_by_id[o.rooms[0]].kind == "living_room"]
     if not living:
         return Sky(hour, weather, round(float(rng.uniform(-math.pi, math.pi)), 4), *outside)
-    widest = max(living, key=lambda o: (math.dist(o.a, o.b) * (o.head - o.sill), o.id))
-    into = inward(house, widest)
+    into = inward(house, max(living, key=lambda o: (math.dist(o.a, o.b) * (o.head - o.sill), o.id)))
     north = math.atan2(into[1], into[0]) + float(rng.normal(0, 0.8))
     return Sky(hour, weather, round(float(wrap(north)), 4), *outside)
 
@@ -226,8 +225,7 @@ def furnishing(draft: Draft) -> Draft:
     seed = draft.seed
     if draft.redraws:
         seed = int(stream(seed, "house", "furniture", draft.redraws).integers(2**31))
-    house = furnish(_made(draft.house, "openings"), stock, seed=seed)
-    return dataclasses.replace(draft, house=house)
+    return dataclasses.replace(draft, house=furnish(_made(draft.house, "openings"), stock, seed=seed))
 
 
 def clearing(draft: Draft) -> Draft:

@@ -57,8 +57,7 @@ class LitRays:
         row = np.minimum((np.arccos(np.clip(ahead[:, 2], -1, 1)) / np.pi * h).astype(int), h - 1)
         out = self.sky[row, column] * np.float32(GLAZING)
         which = np.flatnonzero(face >= 0)
-        weights = np.stack([1 - u - v, u, v], axis=1)[which]
-        at = np.einsum("nk,nkc->nc", weights, self.uv[face[which]])
+        at = np.einsum("nk,nkc->nc", np.stack([1 - u - v, u, v], axis=1)[which], self.uv[face[which]])
         pages = self.page[face[which]]
         for number in np.unique(pages):
             own = pages == number

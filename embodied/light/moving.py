@@ -281,8 +281,7 @@ class MovingHouse:
         if is_inside:
             local[:, 1] = local[:, 1].min() - BEFORE
         corners = pose.points(local)
-        middle = corners.mean(0)
-        home = self.pages.room_around(middle)
+        home = self.pages.room_around(corners.mean(0))
         rooms = [room_at(self.house, c) or home for c in corners]
         if set(rooms) == {home}:
             coefficients = self.pages.radiance(corners, home)

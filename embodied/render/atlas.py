@@ -34,8 +34,7 @@ def packed(pages: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
             column, row, tall = 0, row + tall, 0
         corners[i] = column, row
         column, tall = column + sides[i][1], max(tall, sides[i][0])
-    height = max(row + tall, BLOCK)
-    picture = np.zeros((height, width + width // 2, 4), np.uint8)
+    picture = np.zeros((max(row + tall, BLOCK), width + width // 2, 4), np.uint8)
     for page, (column, row), (rows, columns) in zip(pages, corners.tolist(), sides, strict=True):
         below, beside = rows - page.shape[0] - GUTTER, columns - page.shape[1] - GUTTER
         image = cv2.copyMakeBorder(np.ascontiguousarray(page), GUTTER, below, GUTTER, beside, cv2.BORDER_REPLICATE)

@@ -98,8 +98,7 @@ class Geoms:
         self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`rgb` of the size `drawn`, and `depth_and_ids` of `size`."""
-        picture = self.rgb(camera, drawn, chosen)
-        return picture, *self.depth_and_ids(camera, size, chosen)
+        return self.rgb(camera, drawn, chosen), *self.depth_and_ids(camera, size, chosen)
 
     def close(self) -> None:
         """Free what lies on the graphics side."""

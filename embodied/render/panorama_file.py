@@ -217,8 +217,7 @@ def write_panoramas(path: Path, panoramas: Iterable[Panorama], meta: Mapping[str
 
 def encode(panorama: Panorama) -> tuple[bytes, bytes, bytes]:
     """The three pictures of a node as files: rgb, depth, ids."""
-    bgr = cv2.cvtColor(beside(panorama.rgb), cv2.COLOR_RGB2BGR)
-    rgb = _encoded(".jpg", bgr, *JPEG_OPTIONS)
+    rgb = _encoded(".jpg", cv2.cvtColor(beside(panorama.rgb), cv2.COLOR_RGB2BGR), *JPEG_OPTIONS)
     metres = np.where(np.isfinite(panorama.depth), np.minimum(panorama.depth, FARTHEST_STORED), 0)
     depth = _encoded(".png", beside(np.rint(metres * 1000).astype(np.uint16)), *SMOOTH)
     if panorama.ids.max() > 65535:

@@ -123,8 +123,7 @@ def _look(
     for portal in portals.of_room[room]:
         if portal.opening in path:
             continue
-        through = _through(eye, portal, sector)
-        for part in through:
+        for part in _through(eye, portal, sector):
             if not _look(portals, eye, portal.enters, part, (*path, portal.opening), seen):
                 return False
     return all(_look(portals, eye, other, FULL, path, seen) for other in portals.stairs.get(room, ()))

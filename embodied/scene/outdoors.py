@@ -233,8 +233,7 @@ def _terraces(house: House, place: Scenery) -> tuple[list[Shape], list[Shape]]:
                 continue
             slabs.append(extruded(piece, z - (0.18 if upstairs else GROUND_DROP), z - 0.02))
         if upstairs:
-            line = np.array([ring[0], ring[3], ring[2], ring[1]])
-            for p, q in itertools.pairwise(line):
+            for p, q in itertools.pairwise(np.array([ring[0], ring[3], ring[2], ring[1]])):
                 rails.append(bar((*p, z + 1.0), (*q, z + 1.0), 0.05, 0.04, 0.006))
                 for t in np.linspace(0, 1, max(2, round(np.linalg.norm(q - p) / 0.12))):
                     x, y = p + t * (q - p)
@@ -364,8 +363,7 @@ def _clump(at: np.ndarray, radius: float, *, rng: np.random.Generator) -> Shape:
     a, b, c = out[faces.T]
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
     faces = np.where(inward[:, None], faces[:, ::-1], faces)
-    reach = radius * rng.uniform(0.62, 1.38, BUNCHES)
-    vertices = out * reach[:, None] * [1.15, 1.15, 0.8] + at
+    vertices = out * (radius * rng.uniform(0.62, 1.38, BUNCHES))[:, None] * [1.15, 1.15, 0.8] + at
     uv = vertices[:, [0, 2]] + 0.6 * vertices[:, [1, 1]]  # no seam
     return Shape(vertices, faces, out, uv)
 

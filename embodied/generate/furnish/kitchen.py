@@ -342,8 +342,7 @@ def _run_items(ctx: Context, line: UnitLine, slots: list[UnitSlot]) -> list[tupl
         items += _base_items(ctx, line, slot, len(items))
     for slot in slots:
         half = slot.units * line.width / 2
-        covered = any(s0 - 0.02 < slot.s + half and slot.s - half < s1 + 0.02 for s0, s1 in line.windows)
-        if not covered:
+        if not any(s0 - 0.02 < slot.s + half and slot.s - half < s1 + 0.02 for s0, s1 in line.windows):
             items += _hood(ctx, line, slot) if slot.kind == "cooker" else _upper_items(ctx, line, slot)
     return items
 

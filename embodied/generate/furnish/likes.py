@@ -88,8 +88,7 @@ def depth_before(space: RoomSpace, wall: Wall, s: float) -> float:
             continue
         t = ((other.start[0] - px) * nx + (other.start[1] - py) * ny) / against
         hx, hy = px + t * ix - other.start[0], py + t * iy - other.start[1]
-        along = hx * other.along[0] + hy * other.along[1]
-        if t > 1e-3 and -1e-3 <= along <= other.length + 1e-3:
+        if t > 1e-3 and -1e-3 <= (hx * other.along[0] + hy * other.along[1]) <= other.length + 1e-3:
             best = min(best, t)
     return best
 

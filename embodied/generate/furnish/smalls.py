@@ -107,8 +107,7 @@ class SurfaceOccupancy:
             off = np.abs(gaps - ((x0 + x1) / 2, (y0 + y1) / 2)) / np.maximum((x1 - x0, y1 - y0), 1e-6)
             back = (gaps[:, 1] - y0) / max(y1 - y0, 1e-6)
             far = {"back": 1 - back, "front": back, "side": 0.5 - off[:, 0], "centre": 2 * off.sum(axis=1)}
-            rank = rng.random(len(gaps)) + 3.0 * far.get(spot, 0.0)
-            for k in np.argsort(rank)[:3]:
+            for k in np.argsort(rng.random(len(gaps)) + 3.0 * far.get(spot, 0.0))[:3]:
                 u, v = (float(c) for c in gaps[k])
                 x, y = board.carrier.local(u, v)
                 own = box(x, y, w, d, board.carrier.yaw + yaw, board.top, board.top + h)

@@ -178,8 +178,7 @@ class Tracer:
         f = 0.04 + 0.96 * dr.power(1 - dr.minimum(dr.abs(c), 1), 5)
         mirrors = dr.select(there, surfaces * f / (1 + (surfaces - 1) * f), 0.0)
         at, d = ray.o + ray.d * dr.select(there, first, 0.0), ray.d - 2 * c * normal
-        onward = mi.Ray3f(at + d * radiosity.LIFT, d)
-        second = look(world, onward, there)
+        second = look(world, mi.Ray3f(at + d * radiosity.LIFT, d), there)
         far = picture_at(world.sky, world.rows, d, there) * radiosity.GLAZING
         e = second.e if self.quality == "glossy" else self._traced(second, second.ok & ~second.outdoor, rng)
         seen = dr.select(second.ok & ~second.outdoor, second.albedo * e + second.glow, far)
@@ -221,8 +220,7 @@ class Tracer:
         active = inside & (dr.max(f0) > 1e-3) & (dr.dot(d, hit.normal) > 0)
         if not dr.any(active):
             return diffuse, hit.albedo
-        onward = mi.Ray3f(hit.position + hit.normal * radiosity.LIFT, d)
-        second = look(world, onward, active)
+        second = look(world, mi.Ray3f(hit.position + hit.normal * radiosity.LIFT, d), active)
         far = picture_at(world.sky, world.rows, d, active) * radiosity.GLAZING
         seen = dr.select(second.ok, second.albedo * second.e + second.glow, far)
         seen = dr.select(second.ok & second.outdoor, far * 0.3, seen)
