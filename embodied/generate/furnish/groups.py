@@ -91,7 +91,8 @@ def _model(ctx: Context, part: GroupPart, k: int, of: Asset | None) -> Asset | N
     high[1] = min(high[1], at_round(part.deepest, k, NO_LIMIT))
     high[2] = min(high[2], ctx.space.height - 0.03)
     stretched = part.wider is not None or part.width is not None or part.of_room is not None
-    least, most = (NO_LEAST_SIZE, NO_MOST_SIZE) if stretched else ((*low,), (*high,))
+    limits = ((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+    least, most = (NO_LEAST_SIZE, NO_MOST_SIZE) if stretched else limits
     before = ctx.roles(part.name) if part.same else []
     if before and ctx.chance(part.same):
         return before[-1].asset
