@@ -18,6 +18,7 @@ Pictures
     Unlit, Baked, Traced, ViewSettings  how houses are drawn; how an agent's views are framed
     scene_spec, place              a house as an MjSpec; a robot of any MJCF on its free floor
     NavGraph, Panorama             viewpoints and ways between them; what is seen around one
+    Day, day_of                    who is where in a house at which hour, and the walks between
 Tasks
     make_env                       a Gymnasium environment, as gymnasium.make("embodied/HANNA-v0")
     Task, Observation, Move, Ask, Stop, Intention, Situation, Reply, Subtask, Episode
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
     from embodied.house.validation import load_house
     from embodied.interface import Ask, Episode, Intention, Move, Observation, Reply, Situation, Stop, Subtask, Task
     from embodied.navigation.graph import NavGraph, build_graph
+    from embodied.people.day import Day, day_of
     from embodied.render.classic import Renderer
     from embodied.render.panorama import Panorama
     from embodied.render.pictures import Baked, Traced, Unlit

@@ -24,6 +24,7 @@ from embodied.interface import Sighting
 from embodied.navigation.free_space import closed_doors
 from embodied.navigation.graph import NavGraph, build_graph
 from embodied.navigation.poses import FreePoses
+from embodied.people.day import day_of, seconds_of
 from embodied.render.camera import View
 from embodied.render.classic import Renderer
 from embodied.render.panorama import VFOV36, Panorama
@@ -223,16 +224,22 @@ class World:
             self._moments[-1] = before
             raise
 
-    def at(self, hour: float) -> World:
-        """The same house at rest at another hour: a world of its own, with light of its own.
+    def at(self, time: str | float, *, seed: int = 0) -> World:
+        """The same house at another hour: a world of its own, with light of its own; at a time of day, '18:30', with
+        those who live there, where their day has them (in lit pictures).
 
         Args:
-          hour: local solar time, in [0, 24).
+          time: local solar time, '18:30', or hours in [0, 24) for the house at rest.
+          seed: of the day.
         """
+        hour = seconds_of(time) / 3600 if isinstance(time, str) else time
         if not 0 <= hour < 24:
-            raise ValueError(f"hour should lie in [0, 24), got {hour}")
+            raise ValueError(f"hour should lie in [0, 24), got {time}")
         house = dataclasses.replace(self.house, sky=dataclasses.replace(self.house.sky, hour=hour))
-        return World(house, self.catalogue, self.graph, self.cache, self.pictures)
+        world = World(house, self.catalogue, self.graph, self.cache, self.pictures)
+        if isinstance(time, str):
+            world.show(day_of(house, self.catalogue, seed=seed).at(time))
+        return world
 
     def with_doors(self, openness: Mapping[str, float]) -> Self:
         """The house with some doors opened or closed, otherwise at rest: a world of its own, in the same light, which

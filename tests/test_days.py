@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,22 +10,23 @@ import shapely
 
 from embodied.assets.cache import default_cache
 from embodied.assets.catalogue import load_catalogue
-from embodied.assets.people import people
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.moment import Moment
 from embodied.house.shapes import inward
 from embodied.navigation.free_space import free_floor, leaves
 from embodied.navigation.graph import AGENT_RADIUS
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
-from household_day import day_of, seconds
+from embodied.people.day import day_of, seconds_of
 
 SMALL, CATALOGUE = HouseConfig(area=(38, 46)), load_catalogue(default_cache())
 
 
 def day(seed):
     house = generate_house(seed, SMALL)
-    return house, day_of(house, CATALOGUE, [*people().values()], seed=seed)
+    return house, day_of(house, CATALOGUE, seed=seed)
+
+
+def spots(lives, time):
+    return {name: piece.spot for name, piece in lives.now(time).items()}
 
 
 def floor_of(house, moment):
@@ -47,38 +46,38 @@ def floor_of(house, moment):
 @pytest.mark.parametrize("seed", [7, 10])
 def test_nobody_walks_through_walls_furniture_doors_or_others(seed):
     house, lives = day(seed)
-    walks = [p for own in lives.pieces.values() for p in own if p.course is not None or p.door is not None]
+    walks = [p for own in lives.pieces.values() for p in own if p.leg is not None]
     assert len(walks) > 10 and lives.doors
     rng = np.random.default_rng(seed)
     for p in [walks[i] for i in rng.permutation(len(walks))[:40]]:
         moment = lives.at((p.begin + (p.end - p.begin) * rng.random()) / 3600)
-        now = lives._now(p.begin)
+        now = lives.now(p.begin / 3600)
         floor = floor_of(house, moment)
         places = {name: shapely.Point(f.place.position[:2]) for name, f in moment.people.items()}
         for name, at in places.items():
-            if now[name].course is not None:
+            if now[name].leg is not None:
                 assert floor.buffer(1e-4).covers(at.buffer(AGENT_RADIUS - 0.01))
                 assert all(at.distance(other) > 0.4 for n, other in places.items() if n != name)
 
 
 def test_the_same_seed_gives_the_same_day_and_people_sleep_at_night_and_eat_at_home():
     house, lives = day(7)
-    again = day_of(house, CATALOGUE, [*people().values()], seed=7)
+    again = day_of(house, CATALOGUE, seed=7)
     assert lives.doors == again.doors
     for time in ("7:45", "18:30", 12.0):
-        assert lives.at(time).openness == again.at(time).openness and lives.doing(time) == again.doing(time)
+        assert lives.at(time).openness == again.at(time).openness and spots(lives, time) == spots(again, time)
         assert {n: f.place for n, f in lives.at(time).people.items()} == {
             n: f.place for n, f in again.at(time).people.items()
         }
-    assert day_of(house, CATALOGUE, [*people().values()], seed=8).doors != lives.doors
-    assert {s.activity for s in lives.doing("3:00").values()} == {"sleeping"}
+    assert day_of(house, CATALOGUE, seed=8).doors != lives.doors
+    assert {s.activity for s in spots(lives, "3:00").values()} == {"sleeping"}
     lying = next(iter(lives.at("3:00").people.values()))
     assert lying.pose.joints["pelvis"][0] < -1.5
-    others = {s.activity for h in range(24) for s in lives.doing(h).values()}
+    others = {s.activity for h in range(24) for s in spots(lives, h).values()}
     assert {"eating", "cooking", "washing", "out"} <= others
 
 
 @pytest.mark.parametrize("time", ["25:00", "half past six", -1, float("nan"), "7:75"])
 def test_what_is_no_time_of_a_day_is_refused(time):
     with pytest.raises(ValueError, match="18:30"):
-        seconds(time)
+        seconds_of(time)

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 import shapely
@@ -20,11 +21,12 @@ from embodied.house.shapes import inward
 from embodied.navigation.floor_ways import FloorWays
 from embodied.navigation.free_space import closed_doors, leaves, opened
 from embodied.navigation.graph import AGENT_RADIUS, walkable
-from embodied.people.gait import Course, Limbs, sitting, smooth, solved, turn, walk
+from embodied.people.gait import Bearing, Course, Limbs, sitting, smooth, solved, turn, walk
 
 SIT_SECONDS, DOOR_SECONDS = 1.8, 1.4
-HANDLE_REACH, WAY_STEP = 0.85, 0.05
-"""Metres from which a hand goes to the handle of a door, and between the points of a way."""
+HANDLE_REACH, WAY_STEP, BODY_GAP, LEAST_TURN = 0.85, 0.05, 0.45, 0.1
+"""Metres from which a hand goes to the handle of a door, between the points of a way, and between two people's middles
+at least; radians below which nobody turns on the spot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,15 +38,28 @@ class ErrandLeg:
     course: Course
     door: Swing | None = None
 
+    def bearing(self, seconds: float) -> Bearing:
+        """The body at a time."""
+        out = self.course.at(seconds - self.begin)
+        if self.door is None:
+            return out
+        hand = self.door.handle(smooth((seconds - self.begin) / DOOR_SECONDS), float(out.position[2]))
+        near = math.dist(hand[:2], out.position[:2]) < HANDLE_REACH
+        return dataclasses.replace(out, hands={"right": hand} if near else {}, look=hand)
+
+
+Doors: TypeAlias = Sequence[tuple[str, float, float]]
+"""Openings, with the seconds at which they begin to open and to close."""
+
 
 @dataclass(frozen=True, eq=False)
 class Errand:
-    """Who goes where, from second 0 on: doors with the seconds at which they begin to open and to close, and a seat, x,
-    y and z of the middle of what is sat on at the end and the heading of its front."""
+    """Who goes where, from second 0 on, through which doors, and onto a seat: x, y and z of the middle of what is sat
+    on at the end and the heading of its front."""
 
     person: Person
     legs: Sequence[ErrandLeg]
-    doors: Sequence[tuple[str, float, float]]
+    doors: Doors
     seat: Sequence[float] | None
 
     @property
@@ -55,19 +70,18 @@ class Errand:
     def at(self, seconds: float) -> Moment:
         """The house at a time: the person, by id, and the doors that are open because of them."""
         leg = next((x for x in self.legs if seconds < x.end), self.legs[-1])
-        limbs, bearing = Limbs(self.person), leg.course.at(seconds - leg.begin)
-        if leg.door is not None:
-            hand = leg.door.handle(smooth((seconds - leg.begin) / DOOR_SECONDS), float(bearing.position[2]))
-            hands = {"right": hand} if math.dist(hand[:2], bearing.position[:2]) < HANDLE_REACH else {}
-            bearing = dataclasses.replace(bearing, hands=hands, look=hand)
+        limbs, bearing = Limbs(self.person), leg.bearing(seconds)
         if self.seat is not None and seconds > self.legs[-1].end:
             *middle, front = self.seat
             bearing = sitting(limbs, bearing, np.array(middle), front, (seconds - self.legs[-1].end) / SIT_SECONDS)
-        openness = {}
-        for door, opens, closes in self.doors:
-            if opens < seconds < closes + DOOR_SECONDS:
-                openness[door] = smooth((seconds - opens) / DOOR_SECONDS) - smooth((seconds - closes) / DOOR_SECONDS)
-        return Moment(openness=openness, people={self.person.id: MovingPerson(self.person.id, *solved(limbs, bearing))})
+        figure = MovingPerson(self.person.id, *solved(limbs, bearing))
+        return Moment(openness=openness(self.doors, seconds), people={self.person.id: figure})
+
+
+def openness(doors: Doors, seconds: float) -> dict[str, float]:
+    """How far doors are open at a time, those that are not closed."""
+    moving = (x for x in doors if x[1] < seconds < x[2] + DOOR_SECONDS)
+    return {i: smooth((seconds - a) / DOOR_SECONDS) - smooth((seconds - b) / DOOR_SECONDS) for i, a, b in moving}
 
 
 def errand(
@@ -75,44 +89,65 @@ def errand(
 ) -> Errand:
     """The way over the ground floor between the free places nearest to (x, y) points, away from things where there is
     room, with a seat beside the goal (`Errand.seat`)."""
-    rest, limbs, floor = opened(house, closed_doors(house)), Limbs(person), house.storeys[0].elevation
+    rest = opened(house, closed_doors(house))
     ways = FloorWays(rest, stairs=False)
     swings = [Swing(house, o) for o in house.openings if o.id in closed_doors(house)]
     swept = shapely.union_all([s.area for s in swings])
     free = np.flatnonzero(~shapely.intersects_xy(swept, *ways.xy.T))  # nobody stands in the way of a leaf
     begin, end = (int(free[np.linalg.norm(ways.xy[free] - p, axis=1).argmin()]) for p in (start[:2], goal[:2]))
-    line = _smooth_line(ways.xy[ways.wide_ways(np.array([end])).cells(begin)], walkable(rest))
-    steps = np.diff(line, axis=0, append=2 * line[-1:] - line[-2:-1])
+    line = smooth_line(ways.xy[ways.wide_ways(np.array([end])).cells(begin)], walkable(rest))
+    turned = None, None if seat is None else float(seat[3])
+    return Errand(person, *legs_along(Limbs(person), ways.world(line), swings, turned=turned), seat)
+
+
+def legs_along(
+    limbs: Limbs,
+    points: np.ndarray,
+    swings: Sequence[Swing],
+    since: float = 0.0,
+    turned: tuple[float | None, float | None] = (None, None),
+) -> tuple[list[ErrandLeg], Doors]:
+    """The legs of a walk, and the doors that it leads through.
+
+    Args:
+      points: (m, 3) metres, world, on the floor.
+      since: seconds at which it begins.
+      turned: headings of who stands there before and after; that of the way where None.
+    """
+    begin, end = turned
+    steps = np.diff(points[:, :2], axis=0, append=2 * points[-1:, :2] - points[-2:-1, :2])
     headings = uniform_filter1d(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])), 11, mode="nearest")
-    points = np.insert(line, 2, floor, axis=1)
-    legs, doors = [ErrandLeg(0.0, 0.0, turn(limbs, points[0], headings[0], headings[0]))], []
+    still = lambda k, a, b: turn(limbs, points[k], a, b)
+    legs, doors = [ErrandLeg(since, since, still(0, headings[0], headings[0]))], []
     add = lambda course, seconds, door=None: legs.append(ErrandLeg(legs[-1].end, legs[-1].end + seconds, course, door))
-    stops = sorted(((i, s) for s in swings if (i := s.stop(line)) is not None), key=lambda stop: stop[0])
-    for (first, swing), (last, _) in pairwise([(0, None), *stops, (len(line) - 1, None)]):
+    if begin is not None and abs(float(wrap(headings[0] - begin))) > LEAST_TURN:
+        add(course := still(0, begin, headings[0]), course.seconds)
+    stops = sorted(((i, s) for s in swings if (i := s.stop(points[:, :2])) is not None), key=lambda stop: stop[0])
+    for (first, swing), (last, _) in pairwise([(0, None), *stops, (len(points) - 1, None)]):
         course = walk(limbs, points[first : last + 1], headings[first : last + 1])
         if swing is not None:
-            add(turn(limbs, points[first], headings[first], headings[first]), DOOR_SECONDS, swing)
+            add(still(first, headings[first], headings[first]), DOOR_SECONDS, swing)
             times = np.arange(0, course.seconds, 0.1)
             on_way = np.array([course.body(course.walked(t))[0][:2] for t in times])
             past = float(times[shapely.intersects_xy(swing.area, *on_way.T)].max(initial=0.0)) + 0.2
             doors.append((swing.opening.id, legs[-1].begin, legs[-1].end + past))
         if last > first:
             add(course, course.seconds)
-    if seat is not None and abs(float(wrap(seat[3] - headings[-1]))) > 0.1:
-        course = turn(limbs, points[-1], headings[-1], seat[3])
-        add(course, course.seconds)
-    return Errand(person, legs, doors, seat)
+    if end is not None and abs(float(wrap(end - headings[-1]))) > LEAST_TURN:
+        add(course := still(-1, headings[-1], end), course.seconds)
+    return legs, doors
 
 
-def _smooth_line(cells: np.ndarray, space: shapely.Geometry) -> np.ndarray:
-    """(m, 2) points along a way, its corners rounded as far as the free floor allows."""
+def smooth_line(cells: np.ndarray, space: shapely.Geometry, others: shapely.Geometry | None = None) -> np.ndarray:
+    """(m, 2) points along a way, its corners rounded as far as the free floor allows and BODY_GAP from `others`."""
     metres = np.cumsum([0.0, *np.linalg.norm(np.diff(cells, axis=0), axis=1)])
     every = np.linspace(0, metres[-1], max(2, int(metres[-1] / WAY_STEP) + 1))
     line = np.column_stack([np.interp(every, metres, c) for c in cells.T])
     for size in (17, 9, 5):
         bent = uniform_filter1d(line, size, axis=0, mode="nearest")
         bent[[0, -1]] = line[[0, -1]]
-        if space.covers(shapely.LineString(bent)):
+        way = shapely.LineString(bent)
+        if space.covers(way) and (others is None or not way.dwithin(others, BODY_GAP)):
             return bent
     return line
 

@@ -1,0 +1,313 @@
+"""A day of a household: who is where at which hour, doing what, and the walks between, through doors.
+
+One person walks at a time; the others wait until the way is free. Days are on the ground floor.
+"""
+
+from __future__ import annotations
+
+import bisect
+import dataclasses
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+import shapely
+
+from embodied.assets.catalogue import Catalogue
+from embodied.assets.json_file import read_toml
+from embodied.assets.people import POSES, Person, Pose, people
+from embodied.generate.household import household_of
+from embodied.geometry import facing_of, rotation, yaw_facing
+from embodied.house.house import House, Placement
+from embodied.house.moment import WIDEST, Moment, MovingPerson, RigidPose
+from embodied.house.shapes import footprint, inward
+from embodied.navigation.floor_ways import FloorWays
+from embodied.navigation.free_space import HEAD, LOW, closed_doors, leaves, opened
+from embodied.navigation.graph import AGENT_RADIUS, walkable
+from embodied.people import errands
+from embodied.people.errands import BODY_GAP, ErrandLeg, Swing, legs_along
+from embodied.people.gait import Limbs, between, sitting, smooth, solved
+from embodied.seeds import stream
+
+LATE = 0.25
+"""Hours by which people are before or behind their plan, at most."""
+SETTLING, POSE_SECONDS = (0.0, 1.8, 4.4), 1.0
+"""Seconds to stand, sit down and lie down, and to take up what one does."""
+SPOT_REACH, LYING_BACK = 1.0, 0.11
+"""Metres up to which one stands from where one sits or works, and of the pelvis above what one lies on."""
+Triple: TypeAlias = tuple[float, float, float]
+LEGS = ("pelvis", "thigh", "shin", "foot", "toes")
+"""Ends of the names of joints that activities leave alone."""
+TABLES: Any = read_toml(Path(__file__).with_name("day.toml"))
+ACTIVITIES: Any = TABLES["activities"]
+BEDS = ACTIVITIES["sleeping"]["at"]
+SEATS = {kind for a in ("eating", "working", "watching", "reading", "sleeping") for kind in ACTIVITIES[a]["at"]}
+
+
+@dataclass(frozen=True)
+class DaySpot:
+    """A place to do something at a thing: one stands there, facing a way, and may sit (the middle of the seat) or lie
+    down (where the hips are) from there. `front` is the heading of the thing's front."""
+
+    activity: str
+    thing: str
+    stand: tuple[float, float]
+    heading: float
+    seat: Triple | None = None
+    bed: Triple | None = None
+    front: float = 0.0
+
+    @property
+    def settled(self) -> int:
+        """0 standing, 1 sitting, 2 lying."""
+        return 2 if self.bed else int(self.seat is not None)
+
+    @property
+    def places(self) -> list[np.ndarray]:
+        """(2,) where the body of somebody here may be, first where it stands up."""
+        if self.bed or not self.seat:
+            return [np.array(self.stand)]
+        seat = np.array(self.seat[:2])
+        return [np.array(self.stand), seat, seat + 0.45 * np.array([math.cos(self.front), math.sin(self.front)])]
+
+
+NOWHERE = DaySpot("out", "", (0.0, 0.0), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Part of the day of one person, seconds since midnight: at a spot or on the way there."""
+
+    begin: float
+    end: float
+    spot: DaySpot
+    settled: tuple[float, float] = (0.0, 0.0)
+    """At the beginning and the end: 0 standing, 1 sitting, 2 lying."""
+    leg: ErrandLeg | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Day:
+    """The lives of a household from midnight to midnight.
+
+    Examples:
+      >>> day = day_of(house, catalogue, seed=7)
+      >>> {piece.spot.activity for piece in day.now("3:00").values()}
+      {'sleeping'}
+    """
+
+    house: House
+    figures: Mapping[str, Person]
+    """By name, 'adult_1'."""
+    pieces: Mapping[str, Sequence[Piece]]
+    doors: Sequence[tuple[str, float, float]]
+    """Opening, and seconds at which it begins to open and to close."""
+
+    def at(self, time: str | float) -> Moment:
+        """The house at a time, '18:30' or hours from 0 to 24: everybody in it, and the doors that they open."""
+        now = seconds_of(time)
+        home = {n: p for n, p in self.now(time).items() if p.spot.activity != "out" or p.leg}
+        figures = {n: self._figure(self.figures[n], p, now) for n, p in home.items()}
+        return Moment(openness=errands.openness(self.doors, now), people=figures)
+
+    def now(self, time: str | float) -> dict[str, Piece]:
+        """Everybody's piece of the day; its activity is 'out', and it has no leg, where they are not at home."""
+        now = seconds_of(time)
+        return {n: own[bisect.bisect(own, now, key=lambda p: p.begin) - 1] for n, own in self.pieces.items()}
+
+    def _figure(self, person: Person, p: Piece, now: float) -> MovingPerson:
+        limbs, spot, floor = Limbs(person), p.spot, self.house.storeys[0].elevation
+        done = min((now - p.begin) / max(p.end - p.begin, 1e-9), 1.0)
+        settled = p.settled[0] + (p.settled[1] - p.settled[0]) * done
+        b = p.leg.bearing(now) if p.leg else limbs.standing(np.array([*spot.stand, floor]), spot.heading)
+        if spot.seat is not None and settled > 0:
+            b = sitting(limbs, b, np.array(spot.seat), spot.heading if spot.bed else spot.front, min(settled, 1.0))
+        place, pose = solved(limbs, b)
+        upper = POSES[ACTIVITIES[spot.activity]["pose"]].joints
+        if spot.bed is not None and settled > 1:
+            hips = LYING_BACK - limbs.joints["pelvis"][2]
+            lies = RigidPose.upright(spot.bed, yaw_facing(spot.front)), Pose(upper, hips)
+            place, pose = between((place, pose), lies, smooth(settled - 1))
+        elif p.leg is None and p.settled[0] == p.settled[1]:
+            busy = {name: turn for name, turn in upper.items() if not name.endswith(LEGS)}
+            since = smooth((now - p.begin) / POSE_SECONDS) * smooth((p.end - now) / POSE_SECONDS)
+            place, pose = between((place, pose), (place, Pose({**pose.joints, **busy}, pose.lift)), since)
+        return MovingPerson(person.id, place, pose)
+
+
+def seconds_of(time: str | float) -> float:
+    """Seconds since midnight of '18:30', or of hours.
+
+    Raises:
+      ValueError: no time of a day.
+    """
+    whole, _, minutes = str(time).partition(":")
+    if not re.fullmatch(r"[\d.]+(:[0-5]\d)?", str(time)) or not 0 <= float(whole) <= 24:
+        raise ValueError(f"a time should be like '18:30', or hours from 0 to 24, got {time!r}")
+    return 3600 * float(whole) + 60 * float(minutes or 0)
+
+
+def day_of(house: House, catalogue: Catalogue, *, seed: int) -> Day:
+    """The day of who lives in a house; the same seed gives the same day."""
+    home, rng = household_of(house), stream(seed, "day", house.name)
+    ages = {f"adult_{k + 1}": 40 for k in range(home.adults)}
+    ages |= {f"child_{k + 1}": age for k, age in enumerate(home.children)}
+    everybody = [*people().values()]
+    left, figures = [everybody[i] for i in rng.permutation(len(everybody))], dict[str, Person]()
+    for name, age in ages.items():
+        family = next(iter(figures.values()), left[0]).family
+        unlike = [max(abs(p.age - age), 3 if age < 18 else 20) + 5 * (p.family != family) for p in left]
+        figures[name] = left.pop(int(np.argmin(unlike)))
+    planner, wishes = _Planner(house, catalogue, figures, seed), []
+    for name in ages:
+        late, kind = rng.uniform(-LATE, LATE), "child" if name in [*ages][home.adults :] else "worker"
+        kind = "homeworker" if name == "adult_1" and "works at home" in home.habits else kind
+        beds = (spot for activity in ("sleeping", "reading", "out") for spot in planner.free(name, activity))
+        planner.rest(name, next(beds, NOWHERE), 0.0)
+        for row in TABLES["plans"][kind].split(", "):
+            hour, _, activity = row.partition(" ")
+            wishes.append((3600 * (float(hour) + late + rng.uniform(0, LATE)), name, activity))
+    for when, name, activity in sorted(wishes):
+        planner.go(name, activity, when)
+    return Day(house, figures, planner.pieces, planner.doors)
+
+
+class _Planner:
+    """Owns where everybody is while a day is made."""
+
+    def __init__(self, house: House, catalogue: Catalogue, figures: Mapping[str, Person], seed: int) -> None:
+        self.house, self.assets, self.figures, self.seed = house, catalogue.assets, figures, seed
+        rest = opened(house, closed_doors(house))
+        self.ways, floor = FloorWays(rest, stairs=False), house.storeys[0].elevation
+        rooms = {r.id for r in house.rooms if r.storey == 0}
+        things = [p for p in house.placements if p.room in rooms]
+        solid = [p for p in things if floor + LOW - p.size[2] < p.position[2] < floor + HEAD]
+        self.footprints = {p.id: footprint(p) for p in solid}
+        self.swings = [Swing(house, o) for o in house.openings if o.id in closed_doors(house) or o.kind == "front_door"]
+        self.swept = shapely.union_all([s.area for s in self.swings])
+        self.spots = [s for p in things for s in self._spots(p)]
+        self.space = walkable(rest)
+        for o in (s.opening for s in self.swings if s.opening.kind == "front_door"):
+            middle, into = (np.array(o.a) + o.b) / 2, inward(house, o)
+            x, y = (middle - 0.75 * into).tolist()
+            self.spots.append(DaySpot("out", o.id, (x, y), math.atan2(into[1], into[0])))
+            leaf = shapely.union_all(leaves(house, dataclasses.replace(o, angle=WIDEST))).buffer(AGENT_RADIUS + 0.01)
+            way = shapely.LineString([middle + 0.4 * into, (x, y)]).buffer(0.05)
+            self.space = self.space.union(way).difference(leaf)
+        self.at: dict[str, DaySpot] = {}
+        self.pieces: dict[str, list[Piece]] = {name: [] for name in figures}
+        self.doors: list[tuple[str, float, float]] = []
+        self.free_from = 0.0
+
+    def rest(self, name: str, spot: DaySpot, when: float) -> None:
+        """Be at a spot from now on."""
+        self.pieces[name].append(Piece(when, 86400.0, spot, (spot.settled, spot.settled)))
+        self.at[name] = spot
+
+    def free(self, name: str, activity: str) -> Iterator[DaySpot]:
+        """Spots that nobody else is near, the best kinds first."""
+        rng = stream(self.seed, "spot", self.house.name, name, len(self.pieces[name]))
+        kinds, kind_of = ACTIVITIES[activity]["at"], {p.id: p.object_class for p in self.house.placements}
+        taken = [place for s in self._others(name) for place in s.places]
+        own = [self.spots[i] for i in rng.permutation(len(self.spots)) if self.spots[i].activity == activity]
+        for spot in sorted(own, key=lambda s: kinds.index(kind_of.get(s.thing, kinds[0]))):
+            if all(math.dist(a, b) > BODY_GAP for a in taken for b in spot.places):
+                yield spot
+
+    def go(self, name: str, activity: str, when: float) -> None:
+        """Go to do something; stay where there is no way, or no place for it."""
+        here, when = self.at[name], max(when, self.free_from)
+        for there in self.free(name, activity):
+            if there == here:
+                return
+            line = self._line(name, here, there)
+            if line is not None:
+                self._walk(name, here, there, line, when)
+                return
+
+    def _others(self, name: str) -> list[DaySpot]:
+        return [s for n, s in self.at.items() if n != name and s.activity != "out"]
+
+    def _spots(self, p: Placement) -> Iterator[DaySpot]:
+        """Spots at or on a thing."""
+        (width, depth, height), front, asset = p.size, facing_of(p.yaw), self.assets[p.asset]
+        tops = [x.z * height / asset.size[2] for x in asset.surfaces if x.name in ("seat", "top")]
+        high = tops[0] if tops else 0.46
+        on = lambda x, y: (*_world(p, x, y), p.position[2] + high)
+        for activity in (name for name, a in ACTIVITIES.items() if p.object_class in a["at"]):
+            if activity == "sleeping" and 0.3 <= high <= 0.7:
+                for side in (1, -1):
+                    edge = on(side * (width / 2 - 0.18), 0.1 - depth / 8)
+                    lies = on(side * width / 4 if width > 1.2 else 0.0, depth / 2 - 0.95)
+                    if stand := self._stand(p, edge[:2], True):
+                        yield DaySpot(activity, p.id, stand, p.yaw + (0 if side > 0 else math.pi), edge, lies, front)
+            elif p.object_class in SEATS and 0.3 <= high <= 0.6:
+                for x in (0.3, -0.3) if width > 1.4 else (0.0,):
+                    seat = on(x, min(0.45, 0.2 + depth / 4) - depth / 2)
+                    if stand := self._stand(p, seat[:2], True):
+                        yield DaySpot(activity, p.id, stand, front, seat, front=front)
+            elif p.object_class not in SEATS and (stand := self._stand(p, _world(p, 0.0, -depth / 2), False)):
+                yield DaySpot(activity, p.id, stand, math.atan2(p.position[1] - stand[1], p.position[0] - stand[0]))
+
+    def _stand(self, p: Placement, goal: tuple[float, float], sits: bool) -> tuple[float, float] | None:
+        """The nearest free place to a point of a thing, before it or beside it, with nothing between."""
+        away, front = self.ways.xy - goal, facing_of(p.yaw)
+        far = np.linalg.norm(away, axis=1)
+        before = away @ (math.cos(front), math.sin(front)) > -0.4 * far
+        here = (far < SPOT_REACH) & (self.ways.room_of_cell == p.room)
+        which = np.flatnonzero(here & (before | (p.object_class in BEDS)))
+        point = shapely.Point(goal)
+        others = [o for i, o in self.footprints.items() if i != p.id and not o.buffer(0.02).contains(point)]
+        barred = shapely.union_all(others) if sits else shapely.Point()
+        for x, y in self.ways.xy[which[np.argsort(far[which], kind="stable")]].tolist():
+            way = shapely.LineString([(x, y), goal])
+            if not shapely.intersects_xy(self.swept, x, y) and not way.dwithin(barred, 0.1):
+                return x, y
+        return None
+
+    def _line(self, name: str, here: DaySpot, there: DaySpot) -> np.ndarray | None:
+        """(m, 2) points of the way between two spots past everybody else; None where there is none."""
+        others = shapely.MultiPoint([p for s in self._others(name) for p in s.places[s.seat is not None :]])
+        shut = shapely.dwithin(shapely.points(self.ways.xy), others, BODY_GAP + errands.WAY_STEP)
+        if "out" in (here.activity, there.activity):
+            shut |= ~shapely.intersects_xy(self.space, *self.ways.xy.T)
+        (start, before), (end, after) = self._ends(here), self._ends(there)
+        ways = self.ways.wide_ways(np.array([end]), shut)
+        if shut[end] or not np.isfinite(ways.metres[start]):
+            return None
+        return errands.smooth_line(
+            np.concatenate([before[::-1], self.ways.xy[ways.cells(start)], after]), self.space, others
+        )
+
+    def _ends(self, spot: DaySpot) -> tuple[int, np.ndarray]:
+        """The cell that a way to a spot ends at, and (k, 2) points that it goes on to, out of the front door."""
+        inside = np.array(spot.stand)
+        if spot.activity == "out":
+            inside += 1.15 * np.array([math.cos(spot.heading), math.sin(spot.heading)])
+        return self.ways.cell_at(inside), np.array([inside, spot.stand])[spot.activity != "out" :]
+
+    def _walk(self, name: str, here: DaySpot, there: DaySpot, line: np.ndarray, when: float) -> None:
+        """Get up, go along a line, through doors, and settle."""
+        own = self.pieces[name]
+        own[-1] = dataclasses.replace(own[-1], end=when)
+        add = lambda end, *what: own.append(Piece(own[-1].end, end, *what))
+        if here.settled:
+            add(when + SETTLING[here.settled], here, (here.settled, 0.0))
+        limbs, turned = Limbs(self.figures[name]), (here.heading, there.heading)
+        legs, doors = legs_along(limbs, self.ways.world(line), self.swings, own[-1].end, turned)
+        for leg in legs[1:]:
+            add(leg.end, there, (0.0, 0.0), leg)
+        self.doors += doors
+        if there.settled:
+            add(own[-1].end + SETTLING[there.settled], there, (0.0, there.settled))
+        self.rest(name, there, own[-1].end)
+        self.free_from = own[-1].begin + errands.DOOR_SECONDS * bool(doors)
+
+
+def _world(p: Placement, x: float, y: float) -> tuple[float, float]:
+    a, b = (rotation(p.yaw) @ (x, y) + p.position[:2]).tolist()
+    return a, b
