@@ -301,7 +301,7 @@ def _add(parser: argparse._ActionsContainer, field: dataclasses.Field, hint: Any
 
 def _add_settings(parser: argparse._ActionsContainer, kind: type, settings: Settings) -> None:
     """One option per field of the settings `kind`."""
-    hints, helps = typing.get_type_hints(kind), field_docs(kind)
+    hints, helps = typing.get_type_hints(kind, include_extras=True), field_docs(kind)
     scales = settings.base if settings.of_scale else {"": settings.base}
     for f in dataclasses.fields(kind):
         if f.name in settings.skip:
@@ -309,8 +309,8 @@ def _add_settings(parser: argparse._ActionsContainer, kind: type, settings: Sett
         text = _with_default(
             helps.get(f.name, "").rstrip("."), {name: getattr(c, f.name) for name, c in sorted(scales.items())}
         )
-        item, many, _ = _scalar(hints[f.name])
-        listed = settings.words.get(f.name)
+        item, many, how = _scalar(hints[f.name])
+        listed = settings.words.get(f.name, how.words)
         arguments: dict[str, Any] = {"default": None, "help": text.replace("%", "%%")}
         if item is bool:
             arguments["action"] = argparse.BooleanOptionalAction

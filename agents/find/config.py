@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from embodied.agents.common.settings import AT_LEAST_ONE, NOT_ALL, ImitationSettings, require, require_word
+from embodied.agents.common.settings import AtLeastOne, ImitationSettings, NotAll, Positive, Share
+from embodied.options import Option
 
 SEES_WHAT = ("all", "map", "nothing")
 THINGS = (
@@ -19,27 +21,20 @@ AGENTS = ("network", "detector")
 class FinderConfig(ImitationSettings):
     """Of an agent that learns to find things (DAgger), or of the explorer with a detector beside it."""
 
-    agent: str = "network"
+    agent: Annotated[str, Option(words=AGENTS)] = "network"
     """'network' learns where to look; 'detector' explores the nearest frontier and goes to what it recognises."""
-    sees: str = "all"
+    sees: Annotated[str, Option(words=SEES_WHAT)] = "all"
     """Ablations of vision: 'all': none; 'map': the network sees black pictures, its map still recognises places;
     'nothing': both see black pictures."""
-    hidden_size: int = 128
+    hidden_size: AtLeastOne = 128
     """Width of the network."""
-    dropout: float = 0.3
+    dropout: NotAll = 0.3
     """Dropout rate of features and hidden units."""
-    iterations: int = 800
+    iterations: AtLeastOne = 800
     """Updates of the weights."""
-    learning_rate: float = 3e-3
+    learning_rate: Positive = 3e-3
     """Learning rate of Adam."""
-    cooldown: float = 0.5
+    cooldown: Share = 0.5
     """The last share of the updates, over which the learning rate falls to zero."""
-    validate_every: int = 400
+    validate_every: AtLeastOne = 400
     """Updates between validations."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_word(self, "agent", AGENTS)
-        require_word(self, "sees", SEES_WHAT)
-        require(self, AT_LEAST_ONE, "hidden_size")
-        require(self, NOT_ALL, "dropout")

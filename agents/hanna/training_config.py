@@ -9,21 +9,21 @@ success radius with the task (embodied.kinds.shipped.hanna).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 
 from embodied.agents.common.settings import (
-    AT_LEAST_ONE,
-    NOT_ALL,
-    NOT_NEGATIVE,
-    SHARE,
+    AtLeastOne,
     EvaluationSettings,
     ImitationSettings,
-    require,
-    require_word,
+    NotAll,
+    NotNegative,
+    Share,
+    Whole,
 )
 from embodied.interface import Mode, Observation
+from embodied.options import Option
 from embodied.policies import baselines
 
 
@@ -90,33 +90,33 @@ MODELS = ("hanna", "lstm")
 class TrainingConfig(ImitationSettings):
     """The defaults are Table D.1; HANNA_SCALES holds the smaller settings."""
 
-    model: str = "hanna"
+    model: Annotated[str, Option(words=MODELS)] = "hanna"
     """'hanna' (appendix D.2) or 'lstm' (the encoder-decoder of Table 4.6)."""
-    hidden_size: int = 256
+    hidden_size: AtLeastOne = 256
     """Width of both networks."""
-    navigation_embedding: int = 256
+    navigation_embedding: AtLeastOne = 256
     """Width of an embedded navigation action."""
-    ask_embedding: int = 128
+    ask_embedding: AtLeastOne = 128
     """Width of an embedded decision to ask."""
-    self_heads: int = 8
+    self_heads: AtLeastOne = 8
     """Number of self-attention heads."""
-    text_heads: int = 8
+    text_heads: AtLeastOne = 8
     """Number of instruction-attention heads."""
-    dropout: float = 0.3
+    dropout: NotAll = 0.3
     """Dropout rate in training."""
-    iterations: int = 30_000
+    iterations: AtLeastOne = 30_000
     """Updates of the weights."""
-    training_steps: int = 20
+    training_steps: AtLeastOne = 20
     """Horizon of training episodes."""
-    alpha: float = 1.0
+    alpha: NotNegative = 1.0
     """Weight of the curiosity-encouraging loss; 0: ablation. The authors use 0.5 with ask rules other than
     'learned'."""
-    curiosity_floor: float = 0.0
+    curiosity_floor: NotAll = 0.0
     """Mistakes with a lower probability than this add nothing to the curiosity loss; 0: Eq 4.13 (docs/sources.md,
     S34)."""
-    ask_rule: str = "learned"
+    ask_rule: Annotated[str, Option(words=tuple(sorted(RULES)))] = "learned"
     """Who decides when to ask: 'learned', 'never', 'random' or 'every5'."""
-    guided_asking: float = 0.0
+    guided_asking: Share = 0.0
     """Share of training episodes in which 'every5' asks instead of the learned rule, so that early mistakes in asking
     do not spoil the routes to learn from (docs/sources.md, S33)."""
     read_assistance: bool = True
@@ -131,44 +131,28 @@ class TrainingConfig(ImitationSettings):
     """Order the views from the agent's heading on; False: in absolute order, as in the authors' program
     (docs/sources.md, S29)."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_word(self, "model", MODELS)
-        require_word(self, "ask_rule", tuple(sorted(RULES)))
-        require(self, AT_LEAST_ONE, "hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads")
-        require(self, AT_LEAST_ONE, "training_steps")
-        require(self, NOT_NEGATIVE, "alpha")
-        require(self, NOT_ALL, "dropout", "curiosity_floor")
-        require(self, SHARE, "guided_asking")
-
 
 @dataclass(frozen=True, kw_only=True)
 class HannaEvaluation(EvaluationSettings):
     """How a HANNA agent is evaluated."""
 
-    evaluation_steps: int = 50
+    evaluation_steps: AtLeastOne = 50
     """Longest episode in evaluation, steps."""
-    revisit_weight: float = 1.0
+    revisit_weight: Share = 1.0
     """In evaluation, multiply the probability of a move by this for each earlier visit to its target under the same
     instruction; 1: no effect (docs/sources.md, S36)."""
     use_goal_image: bool = False
     """In evaluation with a goal image, stop only at the place that it shows, and take the shortest path there if it is
     on the topological map (docs/sources.md, S161)."""
-    frontier_discount: float = 0.0
+    frontier_discount: Share = 0.0
     """In evaluation with a goal image, multiply the value of an untried move by this for each step back to it; 0: no
     exploration."""
-    first_ask_threshold: float = 0.5
+    first_ask_threshold: Share = 0.5
     """In evaluation, `ask_threshold` before the first goal image (docs/sources.md, S162)."""
-    route_ask_threshold: float = 0.5
+    route_ask_threshold: Share = 0.5
     """In evaluation, `ask_threshold` on a route (docs/sources.md, S162)."""
-    min_moves_between_requests: int = 0
+    min_moves_between_requests: Whole = 0
     """In evaluation, moves after leaving a route before the learned rule asks again."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require(self, AT_LEAST_ONE, "evaluation_steps")
-        require(self, NOT_NEGATIVE, "min_moves_between_requests")
-        require(self, SHARE, "revisit_weight", "frontier_discount", "first_ask_threshold", "route_ask_threshold")
 
 
 HANNA_SCALES: dict[str, TrainingConfig] = {

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from embodied.agents.common.settings import (
-    AT_LEAST_ONE,
-    NOT_ALL,
-    NOT_NEGATIVE,
-    POSITIVE,
-    SHARE,
+    AtLeastOne,
+    NotAll,
+    NotNegative,
+    Positive,
+    Share,
     ValidatedRunSettings,
-    require,
+    Whole,
 )
 
 
@@ -19,42 +19,38 @@ from embodied.agents.common.settings import (
 class ExecutionConfig(ValidatedRunSettings):
     """The execution policy (appendix E, "operation policy" of Table E.2); the defaults are the table's."""
 
-    hidden_size: int = 256
+    hidden_size: AtLeastOne = 256
     """Width of encoder, decoder and belief."""
-    layers: int = 2
+    layers: AtLeastOne = 2
     """Layers of the encoder, and of the decoder."""
-    heads: int = 8
+    heads: AtLeastOne = 8
     """Attention heads."""
-    dropout: float = 0.1
+    dropout: NotAll = 0.1
     """Dropout rate in training."""
-    iterations: int = 100_000
+    iterations: AtLeastOne = 100_000
     """Updates of the weights."""
-    horizon: int = 15
+    horizon: AtLeastOne = 15
     """Longest pre-training episode, steps."""
-    guided: float = 0.0
+    guided: Share = 0.0
     """Share of the updates at the start over which the expert's share of the steps falls linearly from 1 to 0: DAgger's
     beta (docs/sources.md, S81)."""
-    subgoals: float = 0.0
+    subgoals: Share = 0.0
     """Share of training episodes with a sub-goal of one to three nodes from the start, worded as SUB's answer
     (docs/sources.md, S144)."""
-    stay_fraction: float = 0.0
+    stay_fraction: NotAll = 0.0
     """Share of training steps at which the agent stands still and gets the description of its place, as an agent that
     asks does (docs/sources.md, S172)."""
-    keep_fraction: float = 0.1
+    keep_fraction: Share = 0.1
     """Share of object classes that sparse descriptions keep (docs/sources.md, S170)."""
     reset_on_goal_change: bool = False
     """Reset the belief when the goal on top of the stack changes (docs/sources.md, S145)."""
-    clip: float = 1.0
+    clip: Positive = 1.0
     """Largest gradient norm (docs/sources.md, S76)."""
-    cooldown: float = 0.0
+    cooldown: Share = 0.0
     """Share of the updates at the end over which the learning rate falls linearly to zero (docs/sources.md, S79)."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require(self, AT_LEAST_ONE, "hidden_size", "layers", "heads", "horizon")
-        require(self, POSITIVE, "clip")
-        require(self, NOT_ALL, "dropout", "stay_fraction")
-        require(self, SHARE, "cooldown", "guided", "subgoals", "keep_fraction")
         if self.hidden_size % self.heads:
             raise ValueError(f"hidden_size {self.hidden_size} should be a multiple of heads {self.heads}")
 
@@ -63,45 +59,38 @@ class ExecutionConfig(ValidatedRunSettings):
 class IntentionConfig(ValidatedRunSettings):
     """The intention policy and its critic ("interaction policy" of Table E.2); the defaults are the table's."""
 
-    hidden_size: int = 512
+    hidden_size: AtLeastOne = 512
     """Width of the recurrent networks."""
-    learning_rate: float = 1e-5
+    learning_rate: Positive = 1e-5
     """Learning rate of Adam."""
-    critic_iterations: int = 5_000
+    critic_iterations: Whole = 5_000
     """Updates of the critic alone, before both are trained."""
-    iterations: int = 50_000
+    iterations: AtLeastOne = 50_000
     """Updates of policy and critic together."""
-    entropy: float = 1e-3
+    entropy: NotNegative = 1e-3
     """Weight of the entropy bonus."""
-    clip: float = 1.0
+    clip: Positive = 1.0
     """Largest gradient norm (docs/sources.md, S76)."""
     knows_stack: bool = True
     """Observe how many goals are on the stack; the dissertation's agent does not (4.3.6; docs/sources.md, S77)."""
-    stack: int = 2
+    stack: AtLeastOne = 2
     """Largest number of goals on the stack (L)."""
-    longest: int = 3
+    longest: AtLeastOne = 3
     """Longest path to a sub-goal, nodes (l_max)."""
-    cost: float = 0.01
+    cost: NotNegative = 0.01
     """Cost of each CUR, GOAL, SUB and DO."""
-    horizon: int = 30
+    horizon: AtLeastOne = 30
     """Longest episode, steps (H)."""
     cooperative: bool = True
     """The assistant answers the question that was asked; False: a different one (Table 4.7)."""
-    keep_fraction: float = 0.1
+    keep_fraction: Share = 0.1
     """Share of object classes that sparse descriptions keep (docs/sources.md, S170)."""
     perfect: bool = False
     """Reach sub-goals perfectly, whatever the execution policy does (the skyline of Table 4.7)."""
-    validate_every: int = 250
+    validate_every: AtLeastOne = 250
     """Updates between validations."""
-    validation_tasks: int = 300
+    validation_tasks: AtLeastOne = 300
     """Tasks of each validation, a third from each of its conditions."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require(self, AT_LEAST_ONE, "hidden_size", "stack", "longest", "horizon")
-        require(self, POSITIVE, "clip")
-        require(self, NOT_NEGATIVE, "critic_iterations", "cost", "entropy")
-        require(self, SHARE, "keep_fraction")
 
     @property
     def updates(self) -> int:

@@ -19,12 +19,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+from embodied.agents.common.settings import AtLeastOne, Checked, NotNegative, Positive
 from embodied.agents.language_models.completions import TOOL, Answer, StoredAnswer, read_answer, read_completion
 from embodied.agents.language_models.transport import Endpoint, ServerError, completions_url
 from embodied.assets.cache import digest
 from embodied.errors import UnableError
 from embodied.interface import Usage
-from embodied.options import InputFolder, InputPath, Settings
+from embodied.options import InputFolder, InputPath, Option, Settings
 from embodied.records import from_json, to_json
 
 FORMS = ("schema", "object", "tools", "text")
@@ -42,7 +43,7 @@ Message = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class ServerSettings:
+class ServerSettings(Checked):
     """Which model answers, and how it is asked."""
 
     model: str
@@ -51,31 +52,25 @@ class ServerSettings:
     """Address of the server, which implements OpenAI's chat completions; stored answers do not depend on it."""
     key_variable: str = "OPENAI_API_KEY"
     """Environment variable with the key; a server of your own needs none."""
-    form: str = "schema"
+    form: Annotated[str, Option(words=FORMS)] = "schema"
     """How JSON is requested: structured output of OpenAI (schema) or of llama-cpp-python (object), a tool call (tools),
     or the prompt alone (text)."""
     temperature: float = 0.0
     """Sampling temperature."""
-    most_tokens: int = 300
+    most_tokens: AtLeastOne = 300
     """Longest answer, tokens."""
     price_in: float = 0.0
     """Price of a million tokens sent."""
     price_out: float = 0.0
     """Price of a million tokens answered."""
-    timeout: float = 60.0
+    timeout: Positive = 60.0
     """Seconds to wait for a whole answer."""
-    tries: int = 6
+    tries: AtLeastOne = 6
     """Send a request at most this many times."""
-    wait: float = 1.0
+    wait: NotNegative = 1.0
     """Seconds before the second try; doubled before each further one, up to 30."""
-    together: int = 8
+    together: AtLeastOne = 8
     """Send at most this many requests at a time."""
-
-    def __post_init__(self) -> None:
-        if self.form not in FORMS:
-            raise ValueError(f"form should be one of {FORMS}, got {self.form!r}")
-        if min(self.tries, self.together, self.most_tokens) < 1 or not self.timeout > 0 or self.wait < 0:
-            raise ValueError(f"tries, together and most_tokens should be at least 1 and times positive, got {self}")
 
 
 class AnswerCache:
@@ -259,9 +254,7 @@ class Client:
 class WithModel:
     """The language model."""
 
-    server: Annotated[
-        ServerSettings, Settings("the language model", ServerSettings(""), skip=("wait",), words={"form": FORMS})
-    ]
+    server: Annotated[ServerSettings, Settings("the language model", ServerSettings(""), skip=("wait",))]
     answers: InputPath = Path("answers.sqlite")
     """File that keeps every answer: the same question is not asked twice."""
     offline: bool = False

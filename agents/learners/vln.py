@@ -18,7 +18,7 @@ from embodied.agents.options import (
     study_by,
     training,
 )
-from embodied.agents.vln.config import FORCING, MEASURES, VLN_SCALES, FollowerSettings
+from embodied.agents.vln.config import MEASURES, VLN_SCALES, FollowerSettings
 from embodied.options import Count, Settings
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 class FollowerTraining(SightedRun):
     """An agent that follows route instructions, on a VLN or HANNA data set with features (imitation)."""
 
-    config: Annotated[FollowerSettings, Settings(TRAINING, VLN_SCALES, words={"forcing": FORCING})]
+    config: Annotated[FollowerSettings, Settings(TRAINING, VLN_SCALES)]
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings(), skip=("ask_threshold",))]
 
 

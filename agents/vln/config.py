@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from embodied.agents.common.settings import (
-    AT_LEAST_ONE,
-    NOT_ALL,
-    NOT_NEGATIVE,
-    SHARE,
-    ImitationSettings,
-    require,
-    require_word,
-)
+from embodied.agents.common.settings import AtLeastOne, ImitationSettings, NotAll, NotNegative, Share, Whole
+from embodied.options import Option
 
 MEASURES = ("success", "spl", "nDTW", "SDTW", "navigation error")
 """Columns of tables."""
@@ -25,39 +19,30 @@ then more and more its own (Ross et al. 2011). The label is always the teacher's
 class FollowerSettings(ImitationSettings):
     """How a follower is trained."""
 
-    hidden_size: int = 512
+    hidden_size: AtLeastOne = 512
     """Width of the networks."""
-    dropout: float = 0.2
+    dropout: NotAll = 0.2
     """Dropout rate in training."""
-    forcing: str = "dagger"
+    forcing: Annotated[str, Option(words=FORCING)] = "dagger"
     """Who acts in training: 'teacher', 'student' or 'dagger'."""
     blind: bool = False
     """Ablation without vision: all features are zero."""
     wordless: bool = False
     """Ablation without language: the instruction is empty."""
-    progress_weight: float = 0.5
+    progress_weight: NotNegative = 0.5
     """Weight of the progress monitor's loss: it predicts which share of the path is left (Ma et al. 2019)."""
-    room_weight: float = 0.5
+    room_weight: NotNegative = 0.5
     """Weight of an auxiliary loss: predict the kinds of the current room and of the candidates' rooms."""
-    more_paths: int = 0
+    more_paths: Whole = 0
     """Additional paths per training house, each worded three times."""
-    least_teacher: float = 0.0
+    least_teacher: Share = 0.0
     """Lowest share of steps taken by the teacher in 'dagger', reached halfway."""
-    iterations: int = 20_000
+    iterations: AtLeastOne = 20_000
     """Updates of the weights."""
-    batch: int = 64
+    batch: AtLeastOne = 64
     """Episodes per update."""
-    instruction_length: int = 80
+    instruction_length: AtLeastOne = 80
     """Longest instruction, words; the rest is cut."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_word(self, "forcing", FORCING)
-        require(self, AT_LEAST_ONE, "hidden_size")
-        require(self, NOT_ALL, "dropout")
-        require(self, NOT_NEGATIVE, "progress_weight", "room_weight")
-        require(self, NOT_NEGATIVE, "more_paths")
-        require(self, SHARE, "least_teacher")
 
 
 VLN_SCALES: dict[str, FollowerSettings] = {

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
-from embodied.agents.common.settings import (
-    AT_LEAST_ONE,
-    NOT_ALL,
-    NOT_NEGATIVE,
-    ImitationSettings,
-    require,
-    require_word,
-)
+from embodied.agents.common.settings import AtLeastOne, ImitationSettings, NotAll, Whole
+from embodied.options import Option
 
 ASKERS = ("none", "first", "random", "teacher", "learned")
 """Who decides when to ask (docs/sources.md, S51)."""
@@ -30,41 +25,32 @@ replace the learner's while what it said is in force, as in the program (docs/so
 class VnlaSettings(ImitationSettings):
     """The defaults are the program's; VNLA_SCALES holds smaller ones."""
 
-    hidden_size: int = 512
+    hidden_size: AtLeastOne = 512
     """Width of the LSTMs of encoder and decoder."""
-    word_embedding: int = 256
+    word_embedding: AtLeastOne = 256
     """Width of an embedded word."""
-    navigation_embedding: int = 32
+    navigation_embedding: AtLeastOne = 32
     """Width of an embedded navigation action."""
-    ask_embedding: int = 32
+    ask_embedding: AtLeastOne = 32
     """Width of an embedded decision to ask."""
-    budget_embedding: int = 16
+    budget_embedding: AtLeastOne = 16
     """Width of the embedded number of remaining requests."""
-    dropout: float = 0.5
+    dropout: NotAll = 0.5
     """Dropout rate in training."""
-    iterations: int = 100_000
+    iterations: AtLeastOne = 100_000
     """Updates of the weights; the program's direct-mute agents: 70,000."""
-    looking: int = 10_000
+    looking: Whole = 10_000
     """How many updates, at the start, only teach to read panoramas."""
-    batch: int = 100
+    batch: AtLeastOne = 100
     """Episodes per update."""
-    asker: str = "learned"
+    asker: Annotated[str, Option(words=ASKERS)] = "learned"
     """Who decides when to ask, in training and evaluation: 'none', 'first', 'random', 'teacher' or 'learned'."""
     blind: bool = False
     """Ablation without vision: all features are zero."""
-    rules: str = "indirect"
+    rules: Annotated[str, Option(words=tuple(TRAINED_UNDER))] = "indirect"
     """Rule of play in evaluation: indirect, direct, direct-mute or algorithm-6."""
-    validate_every: int = 1000
+    validate_every: AtLeastOne = 1000
     """Updates between validations."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_word(self, "asker", ASKERS)
-        require_word(self, "rules", tuple(TRAINED_UNDER))
-        require(self, AT_LEAST_ONE, "hidden_size", "word_embedding", "navigation_embedding", "ask_embedding")
-        require(self, AT_LEAST_ONE, "budget_embedding")
-        require(self, NOT_NEGATIVE, "looking")
-        require(self, NOT_ALL, "dropout")
 
 
 VNLA_SCALES: dict[str, VnlaSettings] = {
