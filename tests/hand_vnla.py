@@ -8,8 +8,8 @@ from hand_worlds import grid_world
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import Split
-from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent
 from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
+from embodied.agents.vnla.study import VnlaAbout, VnlaAgent
 from embodied.kinds.shipped.vnla import VNLA
 from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage

@@ -19,7 +19,7 @@ from hand_serve import HEAD, TOGETHER, make_data, write_study
 from embodied.agents.bandit.ratings import Rater, fitted
 from embodied.agents.common.weights import load_weights
 from embodied.agents.iliad.nav.run import NavAbout
-from embodied.agents.vnla.run import vocabulary_of
+from embodied.agents.vnla.study import vocabulary_of
 from embodied.cli import main as start
 from embodied.cli.serve import drawn
 from embodied.envs.base import ActionError

@@ -16,12 +16,11 @@ from embodied.agents.common import imitation
 from embodied.agents.common.imitation import play_with_memory
 from embodied.agents.common.weights import CheckpointError
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vnla.agent import ASKED, LEARNED, TEACHER, VnlaAgent
 from embodied.agents.vnla.config import TRAINED_UNDER
 from embodied.agents.vnla.looking import READING, lessons_of, turned
 from embodied.agents.vnla.network import ASK, DONT, MOST_LEFT, NO_ASK, NO_MOVE, STOP, VnlaPercept
 from embodied.agents.vnla.policy import VnlaMoment, _decided, carried_out, for_training
-from embodied.agents.vnla.run import VnlaLearner, losses_of
+from embodied.agents.vnla.study import ASKED, LEARNED, TEACHER, VnlaAgent, VnlaLearner, losses_of
 from embodied.assets.records import ROOM_KINDS
 from embodied.envs.vnla import RULES_OF_PLAY
 from embodied.evaluation.evaluate import play

@@ -7,7 +7,7 @@ import json
 import pytest
 from hand_data import COMPACT, built, noise_features, small_house, validations_of
 
-from embodied.agents.vnla.agent import VnlaAgent
+from embodied.agents.vnla.study import VnlaAgent
 from embodied.cli import main
 
 pytestmark = pytest.mark.slow

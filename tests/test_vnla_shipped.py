@@ -11,7 +11,7 @@ from hand_worlds import grid_world
 from embodied.agents.common.settings import SHIPPED_ENCODER, SHIPPED_VNLA
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vnla.agent import LEARNED, VnlaAgent
+from embodied.agents.vnla.study import LEARNED, VnlaAgent
 from embodied.evaluation.evaluate import play
 from embodied.interface import Episode
 from embodied.kinds.shipped.vnla import VNLA

@@ -53,7 +53,7 @@ class VnlaStudyOptions(EpisodeStudyOptions, Encoded):
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """The learned asker beside other askers, direct intervention and agents without learning."""
     from embodied.agents.vision.sighted_study import evaluation_data
-    from embodied.agents.vnla.agent import BLIND, WITHOUT_LEARNING, VnlaAgent
+    from embodied.agents.vnla.study import BLIND, WITHOUT_LEARNING, VnlaAgent
 
     source, agent = evaluation_data(data, how), VnlaAgent.load(file)
 
@@ -71,7 +71,7 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
 register_learner(
     Learner(
         name="vnla",
-        train=(VnlaTraining, training("embodied.agents.vnla.run:train_agent", "vnla")),
+        train=(VnlaTraining, training("embodied.agents.vnla.study:train_agent", "vnla")),
         study=(VnlaStudyOptions, study_by("embodied.agents.vnla.study:VnlaStudy")),
         players=players,
         columns=(

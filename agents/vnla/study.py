@@ -1,4 +1,10 @@
-"""The table of VNLA's first paper (Nguyen et al. 2019, arXiv 1812.04155) as data, and VNLA as a learner of the engine.
+"""VNLA: a trained agent and the rows that it is judged in (other askers, direct intervention, agents without
+learning); its training by imitation with two cross-entropies (Eq 4.2 and 4.3), in the loop of agents.common.imitation;
+and the table of its first paper (Nguyen et al. 2019, arXiv 1812.04155) as data, as a learner of the engine.
+
+episodes = play tasks: moves are sampled, questions are the asking teacher's, and where an advisor acts in the
+           learner's place it learns from what is done all the same                              (policy)
+loss = - log pi_main(a*) - log pi_ask(a*), summed over steps, averaged over episodes              (`losses_of`)
 
 Agents are judged with the program's five seeds, from which budgets are drawn. Other askers play with the learned
 asker's networks (docs/sources.md, S160).
@@ -6,20 +12,181 @@ asker's networks (docs/sources.md, S160).
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
-from embodied.agents.common.session import Note
+import torch
+from torch import Tensor
+
+from embodied.action_spaces import WORDS
+from embodied.agents.common import imitation
+from embodied.agents.common.imitation import About, SightedAgent, Supervised
+from embodied.agents.common.session import Note, Progress, descend, seeded_dropout, set_learning_rate
+from embodied.agents.common.settings import EvaluationSettings
+from embodied.agents.common.tensors import choose_at, negative_log_likelihood
+from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
+from embodied.agents.common.weights import check_features
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy
-from embodied.agents.vnla.agent import AT_RANDOM, LEARNED, NEVER, TEACHER, VnlaAgent
-from embodied.agents.vnla.config import VnlaSettings
-from embodied.agents.vnla.run import train_agent
-from embodied.datasets.store import SplitData
-from embodied.interface import Agent
+from embodied.agents.vision.features import FeatureBank
+from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy, Split, TrainingData
+from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
+from embodied.agents.vnla.looking import lessons_of, reading_loss
+from embodied.agents.vnla.network import VnlaNetwork
+from embodied.agents.vnla.policy import VnlaMoment, VnlaPolicy, for_training
+from embodied.assistants.advisor import HELP_STEPS
+from embodied.datasets.store import Dataset, SplitData
+from embodied.interface import Agent, Episode
+from embodied.kinds.shipped.vnla import VNLA
+from embodied.language.plain_language import PlainLanguage
+from embodied.records import identity_of
+from embodied.seeds import stream
+from embodied.teachers.vnla import AskRules, VnlaTeacher
+
+WITHOUT_LEARNING = ("random walk", "listener, random", "listener, teacher", "shortest")
+TEACHER = "learned, asks as its teacher"
+NEVER, AT_RANDOM = "learned, asks never", "learned, asks at random"
+ASKED = {NEVER: "none", "learned, asks first": "first", AT_RANDOM: "random", TEACHER: "teacher"}
+"""Rows that put another asker in front of the same networks (docs/sources.md, S39), and that asker."""
+DIRECT = "learned, direct intervention"
+"""The advisor carries out what it said: direct with sub-goals in the paper."""
+LEARNED = "learned"
+BLIND = {"learned, blind": LEARNED, "blind, asks never": NEVER}
+"""Rows of the same networks, which see black, and who plays them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class VnlaAbout(About):
+    config: VnlaSettings
+
+
+@dataclass(frozen=True, eq=False)
+class VnlaAgent(SightedAgent):
+    about: VnlaAbout
+    network: VnlaNetwork
+    kind, about_kind = "vnla", VnlaAbout
+
+    @staticmethod
+    def network_of(about: VnlaAbout) -> VnlaNetwork:
+        return VnlaNetwork(about.config, len(about.words), about.feature_size)
+
+    def policy(self, bank: FeatureBank, asker: str | None = None) -> VnlaPolicy:
+        """The networks acting as they are judged.
+
+        Args:
+          asker: another than that of its training.
+
+        Raises:
+          ValueError: features of another encoder.
+        """
+        check_features(bank.digest, self.about.encoder)
+        config, judged = self.about.config, self.about.evaluation
+        return VnlaPolicy(
+            self.network,
+            self.vocabulary,
+            bank.blind() if config.blind else bank,
+            asker=asker or config.asker,
+            ask_threshold=judged.ask_threshold,
+            choose=choose_at(judged.evaluation_temperature),
+            instruction_length=config.instruction_length,
+        )
+
+    def rows(self) -> tuple[str, ...]:
+        """All rows that it gives; direct intervention is that of one which learned to read what the advisor says."""
+        direct = (DIRECT,) if self.config.rules == "indirect" else ()
+        return (LEARNED, *ASKED, *BLIND, *direct, *WITHOUT_LEARNING)
+
+    def rules_of_row(self, row: str) -> str:
+        """The rule of play that a row is judged under."""
+        return "direct" if row == DIRECT else self.config.rules
+
+    def player(self, bank: FeatureBank, row: str = LEARNED) -> Agent:
+        """Who plays a row: shown the situations only where its asker needs them."""
+        if row in WITHOUT_LEARNING:
+            return VNLA.agent(row)
+        if row in BLIND:
+            return self.player(bank.blind(), BLIND[row])
+        policy = self.policy(bank, None if row in (LEARNED, DIRECT) else ASKED[row])
+        shown = policy.asker in ("random", "teacher")
+        return Supervised(policy, {"rules": AskRules()}) if shown else policy
+
+
+class VnlaLearner(imitation.ImitationLearner):
+    """A VNLA agent in training."""
+
+    optimizer_kind = torch.optim.AdamW
+
+    def __init__(self, agent: VnlaAgent, training: Split) -> None:
+        super().__init__(agent, training)
+        self._player = for_training(agent.policy(training.bank), VnlaTeacher())
+        shown = dataclasses.replace(training, bank=self._player.policy.bank)
+        self._lessons = lessons_of(shown, agent.vocabulary)
+
+    def learn(self, update: int) -> Mapping[str, float]:
+        c = self.config
+        if update >= c.looking:
+            return super().learn(update)
+        self.network.train()
+        with seeded_dropout(c.seed, update):
+            set_learning_rate(self.optimizer, c.learning_rate, update, c.looking, c.cooldown)
+            loss = reading_loss(self.network.looker, self._lessons, stream(c.seed, "looks", update))
+            return {"reading": float(loss.detach()), "gradient": descend(loss, self.optimizer, f"update {update}")}
+
+    def player(self, update: int, bank: FeatureBank) -> Agent:
+        return self._player
+
+    def loss_of(self, episodes: Sequence[Episode], experience: Sequence[VnlaMoment]) -> imitation.BatchLoss:
+        losses = losses_of(experience, self.config.batch)
+        right = torch.cat([m.moves.argmax(-1) == m.move_labels for m in experience])
+        asks, wished = torch.cat([m.asks for m in experience]), torch.cat([m.ask_labels for m in experience])
+        numbers = {
+            "right moves": float(right.float().mean()),
+            **imitation.played(episodes, self.training.worlds),
+            **imitation.asked(episodes, asks, wished),
+        }
+        loss = losses[0] + losses[1] if self.config.asker == "learned" else losses[0]
+        return imitation.BatchLoss(losses, loss, numbers)
+
+    def evaluated_agent(self, split: Split) -> Agent:
+        return self.agent.player(split.bank)
+
+
+def losses_of(moments: Sequence[VnlaMoment], episodes: int) -> tuple[Tensor, Tensor]:
+    """Eq 4.3: navigation and asking, summed over steps, averaged over episodes (docs/sources.md, S114)."""
+    moves, asks = (torch.cat([getattr(m, n) for m in moments]) for n in ("moves", "asks"))
+    wanted, wished = (torch.cat([getattr(m, n) for m in moments]) for n in ("move_labels", "ask_labels"))
+    navigation = negative_log_likelihood(moves, wanted).sum() / episodes
+    return navigation, negative_log_likelihood(asks, wished).sum() / episodes
+
+
+def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
+    """Words of the requests in the training split's first `houses` houses, and of all that the advisor can say."""
+    names = data.names("train")[:houses]
+    requests = [t.request for t in data.tasks("train") if t.world in names]
+    answers = [PlainLanguage().subgoal([w] * n + ["stop"]) for w in WORDS for n in range(1, HELP_STEPS + 1)]
+    return build_vocabulary([*requests, *answers, *(s.text for s in data.utterances(names))])
+
+
+def train_agent(
+    source: TrainingData,
+    config: VnlaSettings,
+    evaluation: EvaluationSettings,
+    folder: Path,
+    **options: Unpack[imitation.Options],
+) -> Progress:
+    """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
+    houses = config.training_houses or None
+    training = source.split("train", houses=houses, rules=TRAINED_UNDER[config.rules])
+    validation = source.split("val_unseen", limit=config.validation_tasks, rules=config.rules)
+    words = vocabulary_of(source.data, houses)
+    agent = VnlaAgent.new(source.about(VnlaAbout, config, evaluation, words))
+    agent.network.to(source.device)
+    identity = identity_of("embodied.agents.vnla.study", settings=config, **source.identity())
+    return imitation.train(VnlaLearner(agent, training), validation, folder, identity, **options)
+
 
 EVALUATION_SEEDS = (123, 435, 6757, 867, 983)
 """The program's."""
@@ -63,8 +230,8 @@ class VnlaStudy(SightedStudy):
     eval_seeds: tuple[int, ...] = EVALUATION_SEEDS
 
     name, agent_kind, all_tables = "vnla", VnlaAgent, VNLA_TABLES
-    makers = ("embodied.agents.vnla.run",)
-    judges = (*JUDGES, "embodied.agents.vnla.agent")
+    makers = ("embodied.agents.vnla.study",)
+    judges = (*JUDGES, "embodied.agents.vnla.study")
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         train_agent(self.training_data(), self.settings(train, seed), self.evaluation, home, note=note)
