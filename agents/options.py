@@ -8,25 +8,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
+from embodied import options
 from embodied.agents.common.settings import SHIPPED_ENCODER
 from embodied.agents.vision.config import RENDER_PRESETS
-from embodied.options import (
-    PICTURE_HELP,
-    REPEATS,
-    Cached,
-    Count,
-    InputFolder,
-    InputPath,
-    Option,
-    OutputFolder,
-    positive,
-    whole,
-)
 
 if TYPE_CHECKING:
     from embodied.agents.vision.sighted_study import TrainingData
 
-PRESET = Option(words=tuple(RENDER_PRESETS), helps=PICTURE_HELP)
+PRESET = options.Option(words=tuple(RENDER_PRESETS), helps=options.PICTURE_HELP)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,13 +27,13 @@ class Drawn:
 
 @dataclass(frozen=True, kw_only=True)
 class Encoded(Drawn):
-    encoder: InputPath = SHIPPED_ENCODER
+    encoder: options.InputPath = SHIPPED_ENCODER
     """An encoder of `embodied train vision` (default: shipped)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Threaded:
-    threads: Count = 1
+    threads: options.Count = 1
     """CPU threads of PyTorch."""
 
 
@@ -55,20 +44,20 @@ class WithDevice:
 
 
 @dataclass(frozen=True, kw_only=True)
-class WithData(Cached, Threaded):
-    data: InputFolder
+class WithData(options.Cached, Threaded):
+    data: options.InputFolder
     """The data set, a folder that `embodied dataset` built."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Timed:
-    minutes: Annotated[float | None, Option(positive, "X")] = None
+    minutes: Annotated[float | None, options.Option(options.positive, "X")] = None
     """Stop after X minutes; rerun the command to resume."""
 
 
 TRAINING, EVALUATION = "settings of training", "settings of evaluation"
 """Titles of groups of options."""
-SCALE = Option(words=("mini", "paper"))
+SCALE = options.Option(words=("mini", "paper"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,19 +68,19 @@ class Scaled:
 
 @dataclass(frozen=True, kw_only=True)
 class ScaledDown(Scaled):
-    scale: Annotated[str, Option(words=("mini", "paper", "tiny"))] = "mini"
+    scale: Annotated[str, options.Option(words=("mini", "paper", "tiny"))] = "mini"
     """The settings to start from."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Run(WithData, Timed, Scaled):
-    out: OutputFolder
+    out: options.OutputFolder
     """Run folder; rerun the command to resume an interrupted run."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Nav(Cached, Encoded):
-    data: InputFolder
+class Nav(options.Cached, Encoded):
+    data: options.InputFolder
     """The data set, a folder that `embodied dataset vln` or `hanna` built."""
 
 
@@ -136,19 +125,19 @@ def training(function: str, kind: str) -> Callable[..., None]:
 
 # Studies ------------------------------------------------------------------------------------------
 
-Tables = Annotated[tuple[str, ...], Option(metavar="TABLE", name="TABLE")]
-Seeds = Annotated[int, Option(whole(1, REPEATS), "N")]
+Tables = Annotated[tuple[str, ...], options.Option(metavar="TABLE", name="TABLE")]
+Seeds = Annotated[int, options.Option(options.whole(1, options.REPEATS), "N")]
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOptions(Threaded):
     """Options of every study."""
 
-    out: OutputFolder
+    out: options.OutputFolder
     """Folder of the study: runs, episodes and tables; rerun the command to resume."""
-    rows: tuple[Annotated[str, Option(metavar="LABEL")], ...] = ()
+    rows: tuple[Annotated[str, options.Option(metavar="LABEL")], ...] = ()
     """Run only the rows with these labels."""
-    workers: Count = 1
+    workers: options.Count = 1
     """Train N runs in parallel."""
     report: bool = False
     """Train and evaluate nothing; write tables of the stored results."""
@@ -164,7 +153,7 @@ class Repeated:
 class EpisodeStudyOptions(StudyOptions, Repeated, WithData, Scaled):
     """Options of studies whose agents play episodes."""
 
-    tasks: Count | None = None
+    tasks: options.Count | None = None
     """Evaluate on at most N tasks of a split, spread over its houses (default: all)."""
 
 

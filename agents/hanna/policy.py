@@ -11,36 +11,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from embodied import interface
 from embodied.agents.common.tensors import Chooser, RunningRows, choose_greedily, choose_sampled, hidden_channels
 from embodied.agents.common.vocabulary import Vocabulary
-from embodied.agents.hanna.attention import (
-    COPIES,
-    DO_NOTHING,
-    HEADINGS,
-    REQUEST,
-    SLOTS,
-    START,
-    VIEWS,
-    Percept,
-    candidate_rows,
-    orientation,
-)
+from embodied.agents.hanna import attention
 from embodied.agents.hanna.network import AgentNetwork, Scores
 from embodied.agents.hanna.training_config import RULES, HannaAskRule, ask_greedily, ask_sampled
 from embodied.agents.vision.features import FeatureBank
-from embodied.interface import (
-    Action,
-    Actions,
-    Ask,
-    Intention,
-    Mode,
-    Move,
-    Observation,
-    Observations,
-    Rngs,
-    Stop,
-    Thought,
-)
 
 StepScores = tuple[tuple[int, ...], Scores]
 """Outputs of the networks in one step, after the places in the batch of the episodes that were still running."""
@@ -71,7 +48,7 @@ class Steering:
     """How well the picture that it was shown matches what it sees."""
 
 
-Steer = Callable[[int, Observation, np.ndarray], Steering]
+Steer = Callable[[int, interface.Observation, np.ndarray], Steering]
 """(place in the batch, observation, (n + 1,) probabilities of the actions, stop first) -> what is made of them."""
 
 
@@ -101,13 +78,13 @@ class HannaPolicy:
 
     def act(
         self,
-        observations: Observations,
+        observations: interface.Observations,
         memory: HannaMemory | None,
         *,
-        rngs: Rngs,
+        rngs: interface.Rngs,
         steer: Steer | None = None,
         imposed: Sequence[int | None] | None = None,
-    ) -> tuple[Actions, HannaMemory]:
+    ) -> tuple[interface.Actions, HannaMemory]:
         """One step of every running episode; see embodied.interface.Policy.
 
         Args:
@@ -118,7 +95,7 @@ class HannaPolicy:
         positions = tuple(i for i, o in enumerate(observations) if o is not None)
         seen = [o for o in observations if o is not None]
         memory = self.start(positions) if memory is None else memory.keep(positions)
-        actions: Actions = [None] * len(observations)
+        actions: interface.Actions = [None] * len(observations)
         if not positions:
             return actions, memory
         percept = self.percept(seen, memory)
@@ -137,19 +114,21 @@ class HannaPolicy:
             actions[position] = asked_or(
                 index, thought, o, None if steering.known else rule, memory.last_ask[row], rngs[position]
             )
-            chosen.append(0 if isinstance(actions[position], Ask) else index)  # its own move is discarded
-        device, asks = percept.actions.device, [isinstance(actions[p], Ask) for p in positions]
+            chosen.append(0 if isinstance(actions[position], interface.Ask) else index)  # its own move is discarded
+        device, asks = percept.actions.device, [isinstance(actions[p], interface.Ask) for p in positions]
         taken = torch.arange(len(positions), device=device), torch.tensor(chosen, device=device)
         return actions, dataclasses.replace(
             memory,
             networks=networks,
             previous_action=percept.actions[taken],
-            previous_ask=torch.tensor([REQUEST if ask else DO_NOTHING for ask in asks], device=device),
+            previous_ask=torch.tensor(
+                [attention.REQUEST if ask else attention.DO_NOTHING for ask in asks], device=device
+            ),
             last_ask=tuple(o.time if ask else t for ask, o, t in zip(asks, seen, memory.last_ask, strict=True)),
             moments=(*memory.moments, (positions, scores)) if self.learns else (),
         )
 
-    def scored(self, memory: HannaMemory, percept: Percept) -> tuple[Scores, tuple[Any, Any]]:
+    def scored(self, memory: HannaMemory, percept: attention.Percept) -> tuple[Scores, tuple[Any, Any]]:
         """Outputs of the networks for a step, and their memories."""
         return self.network(memory.networks, percept)
 
@@ -160,18 +139,18 @@ class HannaPolicy:
             positions=positions,
             networks=self.network.start(k, self.instruction_length),
             previous_action=torch.zeros(k, self.network.action_size, device=device),
-            previous_ask=torch.full((k,), START, device=device),
+            previous_ask=torch.full((k,), attention.START, device=device),
             last_ask=(-1,) * k,
             channels=hidden_channels(k, self.bank.size, self.environment_dropout, device),
         )
 
-    def percept(self, observations: Sequence[Observation], memory: HannaMemory) -> Percept:
+    def percept(self, observations: Sequence[interface.Observation], memory: HannaMemory) -> attention.Percept:
         """The tensors of one step, from observations of running episodes and their memory."""
-        views, angles, mask = candidate_rows(observations)
+        views, angles, mask = attention.candidate_rows(observations)
         k, most = views.shape
         turns = np.array([o.turn for o in observations])[:, None]  # (k, 1)
-        slots = views // HEADINGS * HEADINGS + (views - turns) % HEADINGS
-        slots[:, 0] = SLOTS - 1
+        slots = views // attention.HEADINGS * attention.HEADINGS + (views - turns) % attention.HEADINGS
+        slots[:, 0] = attention.SLOTS - 1
 
         device = next(self.network.parameters()).device
         send = lambda array: torch.from_numpy(array).to(device)
@@ -181,14 +160,16 @@ class HannaPolicy:
             current, target = current * memory.channels[:, None], target * memory.channels[:, None]
         rows = torch.arange(k, device=device)[:, None]
         looks = current[rows, send(views)]  # (k, A, D)
-        facing = orientation(send(angles[0]), send(angles[1]), COPIES)  # docs/sources.md, S27
+        facing = attention.orientation(send(angles[0]), send(angles[1]), attention.COPIES)  # docs/sources.md, S27
         exists = torch.arange(most, device=device)[:, None] > 0  # stop and padding are zero vectors
         actions = torch.cat([looks, facing], -1) * (exists & send(mask)[..., None])
         if self.turn_to_agent:
-            views_of_turn = np.arange(VIEWS)[None]
-            order = send(views_of_turn // HEADINGS * HEADINGS + (views_of_turn + turns) % HEADINGS)  # (k, 36)
+            views_of_turn = np.arange(attention.VIEWS)[None]
+            order = send(
+                views_of_turn // attention.HEADINGS * attention.HEADINGS + (views_of_turn + turns) % attention.HEADINGS
+            )  # (k, 36)
             current, target = current[rows, order], target[rows, order]
-        return Percept(
+        return attention.Percept(
             tokens=send(np.stack([self.encode(o) for o in observations])),
             new_task=send(np.array([o.time_on_task == 0 for o in observations])),
             current=current,
@@ -200,19 +181,19 @@ class HannaPolicy:
             previous_ask=memory.previous_ask,
         )
 
-    def encode(self, observation: Observation) -> np.ndarray:
+    def encode(self, observation: interface.Observation) -> np.ndarray:
         """(L,) int64 numbers of the instruction's words."""
-        text = observation.instruction if self.read_assistance or observation.mode is Mode.MAIN else ""
+        text = observation.instruction if self.read_assistance or observation.mode is interface.Mode.MAIN else ""
         return self.vocabulary.encode(text, self.instruction_length)
 
 
-def thoughts_of(scores: Scores, observations: Sequence[Observation]) -> list[Thought]:
+def thoughts_of(scores: Scores, observations: Sequence[interface.Observation]) -> list[interface.Thought]:
     """Outputs of the networks for each observation, as it is written down: a Thought has stop last."""
     moves = scores.navigation.detach().softmax(-1).cpu().numpy()  # (k, A), stop first
-    asks = scores.ask.detach().softmax(-1)[:, REQUEST].cpu().numpy()  # (k,)
+    asks = scores.ask.detach().softmax(-1)[:, attention.REQUEST].cpu().numpy()  # (k,)
     reasons = None if scores.reasons is None else scores.reasons.detach().sigmoid().tolist()  # (k, 3)
     return [
-        Thought(
+        interface.Thought(
             moves=np.roll(moves[row, : len(o.candidates) + 1], -1),
             asks={"help": float(asks[row]), "nothing": float(1 - asks[row])},
             reasons=None if reasons is None else tuple(reasons[row]),
@@ -222,13 +203,18 @@ def thoughts_of(scores: Scores, observations: Sequence[Observation]) -> list[Tho
 
 
 def asked_or(
-    index: int, thought: Thought, o: Observation, rule: HannaAskRule | None, last_ask: int, rng: np.random.Generator
-) -> Action:
+    index: int,
+    thought: interface.Thought,
+    o: interface.Observation,
+    rule: HannaAskRule | None,
+    last_ask: int,
+    rng: np.random.Generator,
+) -> interface.Action:
     """A request if the rule wants one where it can be made, else the action `index`: 0 is stop, c + 1 candidate c."""
     assert thought.asks is not None
-    if Intention.HELP in o.can_ask and rule is not None and rule(thought.asks["help"], o, last_ask, rng=rng):
-        return Ask(Intention.HELP, thought)
-    return Stop(thought) if index == 0 else Move(index - 1, thought)
+    if interface.Intention.HELP in o.can_ask and rule is not None and rule(thought.asks["help"], o, last_ask, rng=rng):
+        return interface.Ask(interface.Intention.HELP, thought)
+    return interface.Stop(thought) if index == 0 else interface.Move(index - 1, thought)
 
 
 def for_training(

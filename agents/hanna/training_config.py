@@ -13,15 +13,7 @@ from typing import Annotated, Protocol
 
 import numpy as np
 
-from embodied.agents.common.settings import (
-    AtLeastOne,
-    EvaluationSettings,
-    ImitationSettings,
-    NotAll,
-    NotNegative,
-    Share,
-    Whole,
-)
+from embodied.agents.common import settings
 from embodied.interface import Mode, Observation
 from embodied.options import Option
 from embodied.policies import baselines
@@ -87,36 +79,36 @@ MODELS = ("hanna", "lstm")
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainingConfig(ImitationSettings):
+class TrainingConfig(settings.ImitationSettings):
     """The defaults are Table D.1; HANNA_SCALES holds the smaller settings."""
 
     model: Annotated[str, Option(words=MODELS)] = "hanna"
     """'hanna' (appendix D.2) or 'lstm' (the encoder-decoder of Table 4.6)."""
-    hidden_size: AtLeastOne = 256
+    hidden_size: settings.AtLeastOne = 256
     """Width of both networks."""
-    navigation_embedding: AtLeastOne = 256
+    navigation_embedding: settings.AtLeastOne = 256
     """Width of an embedded navigation action."""
-    ask_embedding: AtLeastOne = 128
+    ask_embedding: settings.AtLeastOne = 128
     """Width of an embedded decision to ask."""
-    self_heads: AtLeastOne = 8
+    self_heads: settings.AtLeastOne = 8
     """Number of self-attention heads."""
-    text_heads: AtLeastOne = 8
+    text_heads: settings.AtLeastOne = 8
     """Number of instruction-attention heads."""
-    dropout: NotAll = 0.3
+    dropout: settings.NotAll = 0.3
     """Dropout rate in training."""
-    iterations: AtLeastOne = 30_000
+    iterations: settings.AtLeastOne = 30_000
     """Updates of the weights."""
-    training_steps: AtLeastOne = 20
+    training_steps: settings.AtLeastOne = 20
     """Horizon of training episodes."""
-    alpha: NotNegative = 1.0
+    alpha: settings.NotNegative = 1.0
     """Weight of the curiosity-encouraging loss; 0: ablation. The authors use 0.5 with ask rules other than
     'learned'."""
-    curiosity_floor: NotAll = 0.0
+    curiosity_floor: settings.NotAll = 0.0
     """Mistakes with a lower probability than this add nothing to the curiosity loss; 0: Eq 4.13 (docs/sources.md,
     S34)."""
     ask_rule: Annotated[str, Option(words=tuple(sorted(RULES)))] = "learned"
     """Who decides when to ask: 'learned', 'never', 'random' or 'every5'."""
-    guided_asking: Share = 0.0
+    guided_asking: settings.Share = 0.0
     """Share of training episodes in which 'every5' asks instead of the learned rule, so that early mistakes in asking
     do not spoil the routes to learn from (docs/sources.md, S33)."""
     read_assistance: bool = True
@@ -133,25 +125,25 @@ class TrainingConfig(ImitationSettings):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HannaEvaluation(EvaluationSettings):
+class HannaEvaluation(settings.EvaluationSettings):
     """How a HANNA agent is evaluated."""
 
-    evaluation_steps: AtLeastOne = 50
+    evaluation_steps: settings.AtLeastOne = 50
     """Longest episode in evaluation, steps."""
-    revisit_weight: Share = 1.0
+    revisit_weight: settings.Share = 1.0
     """In evaluation, multiply the probability of a move by this for each earlier visit to its target under the same
     instruction; 1: no effect (docs/sources.md, S36)."""
     use_goal_image: bool = False
     """In evaluation with a goal image, stop only at the place that it shows, and take the shortest path there if it is
     on the topological map (docs/sources.md, S161)."""
-    frontier_discount: Share = 0.0
+    frontier_discount: settings.Share = 0.0
     """In evaluation with a goal image, multiply the value of an untried move by this for each step back to it; 0: no
     exploration."""
-    first_ask_threshold: Share = 0.5
+    first_ask_threshold: settings.Share = 0.5
     """In evaluation, `ask_threshold` before the first goal image (docs/sources.md, S162)."""
-    route_ask_threshold: Share = 0.5
+    route_ask_threshold: settings.Share = 0.5
     """In evaluation, `ask_threshold` on a route (docs/sources.md, S162)."""
-    min_moves_between_requests: Whole = 0
+    min_moves_between_requests: settings.Whole = 0
     """In evaluation, moves after leaving a route before the learned rule asks again."""
 
 

@@ -4,49 +4,41 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from embodied.agents.common.settings import (
-    AtLeastOne,
-    NotAll,
-    NotNegative,
-    Positive,
-    Share,
-    ValidatedRunSettings,
-    Whole,
-)
+from embodied.agents.common import settings
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExecutionConfig(ValidatedRunSettings):
+class ExecutionConfig(settings.ValidatedRunSettings):
     """The execution policy (appendix E, "operation policy" of Table E.2); the defaults are the table's."""
 
-    hidden_size: AtLeastOne = 256
+    hidden_size: settings.AtLeastOne = 256
     """Width of encoder, decoder and belief."""
-    layers: AtLeastOne = 2
+    layers: settings.AtLeastOne = 2
     """Layers of the encoder, and of the decoder."""
-    heads: AtLeastOne = 8
+    heads: settings.AtLeastOne = 8
     """Attention heads."""
-    dropout: NotAll = 0.1
+    dropout: settings.NotAll = 0.1
     """Dropout rate in training."""
-    iterations: AtLeastOne = 100_000
+    iterations: settings.AtLeastOne = 100_000
     """Updates of the weights."""
-    horizon: AtLeastOne = 15
+    horizon: settings.AtLeastOne = 15
     """Longest pre-training episode, steps."""
-    guided: Share = 0.0
+    guided: settings.Share = 0.0
     """Share of the updates at the start over which the expert's share of the steps falls linearly from 1 to 0: DAgger's
     beta (docs/sources.md, S81)."""
-    subgoals: Share = 0.0
+    subgoals: settings.Share = 0.0
     """Share of training episodes with a sub-goal of one to three nodes from the start, worded as SUB's answer
     (docs/sources.md, S144)."""
-    stay_fraction: NotAll = 0.0
+    stay_fraction: settings.NotAll = 0.0
     """Share of training steps at which the agent stands still and gets the description of its place, as an agent that
     asks does (docs/sources.md, S172)."""
-    keep_fraction: Share = 0.1
+    keep_fraction: settings.Share = 0.1
     """Share of object classes that sparse descriptions keep (docs/sources.md, S170)."""
     reset_on_goal_change: bool = False
     """Reset the belief when the goal on top of the stack changes (docs/sources.md, S145)."""
-    clip: Positive = 1.0
+    clip: settings.Positive = 1.0
     """Largest gradient norm (docs/sources.md, S76)."""
-    cooldown: Share = 0.0
+    cooldown: settings.Share = 0.0
     """Share of the updates at the end over which the learning rate falls linearly to zero (docs/sources.md, S79)."""
 
     def __post_init__(self) -> None:
@@ -56,40 +48,40 @@ class ExecutionConfig(ValidatedRunSettings):
 
 
 @dataclass(frozen=True, kw_only=True)
-class IntentionConfig(ValidatedRunSettings):
+class IntentionConfig(settings.ValidatedRunSettings):
     """The intention policy and its critic ("interaction policy" of Table E.2); the defaults are the table's."""
 
-    hidden_size: AtLeastOne = 512
+    hidden_size: settings.AtLeastOne = 512
     """Width of the recurrent networks."""
-    learning_rate: Positive = 1e-5
+    learning_rate: settings.Positive = 1e-5
     """Learning rate of Adam."""
-    critic_iterations: Whole = 5_000
+    critic_iterations: settings.Whole = 5_000
     """Updates of the critic alone, before both are trained."""
-    iterations: AtLeastOne = 50_000
+    iterations: settings.AtLeastOne = 50_000
     """Updates of policy and critic together."""
-    entropy: NotNegative = 1e-3
+    entropy: settings.NotNegative = 1e-3
     """Weight of the entropy bonus."""
-    clip: Positive = 1.0
+    clip: settings.Positive = 1.0
     """Largest gradient norm (docs/sources.md, S76)."""
     knows_stack: bool = True
     """Observe how many goals are on the stack; the dissertation's agent does not (4.3.6; docs/sources.md, S77)."""
-    stack: AtLeastOne = 2
+    stack: settings.AtLeastOne = 2
     """Largest number of goals on the stack (L)."""
-    longest: AtLeastOne = 3
+    longest: settings.AtLeastOne = 3
     """Longest path to a sub-goal, nodes (l_max)."""
-    cost: NotNegative = 0.01
+    cost: settings.NotNegative = 0.01
     """Cost of each CUR, GOAL, SUB and DO."""
-    horizon: AtLeastOne = 30
+    horizon: settings.AtLeastOne = 30
     """Longest episode, steps (H)."""
     cooperative: bool = True
     """The assistant answers the question that was asked; False: a different one (Table 4.7)."""
-    keep_fraction: Share = 0.1
+    keep_fraction: settings.Share = 0.1
     """Share of object classes that sparse descriptions keep (docs/sources.md, S170)."""
     perfect: bool = False
     """Reach sub-goals perfectly, whatever the execution policy does (the skyline of Table 4.7)."""
-    validate_every: AtLeastOne = 250
+    validate_every: settings.AtLeastOne = 250
     """Updates between validations."""
-    validation_tasks: AtLeastOne = 300
+    validation_tasks: settings.AtLeastOne = 300
     """Tasks of each validation, a third from each of its conditions."""
 
     @property

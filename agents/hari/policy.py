@@ -13,14 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from embodied.agents.hari.networks import (
-    INTENTIONS,
-    EncodedDescriptions,
-    Executor,
-    HariAgent,
-    RecurrentHead,
-    shown_probabilities,
-)
+from embodied.agents.hari import networks
 from embodied.agents.hari.words import collate, percept
 from embodied.interface import (
     Action,
@@ -38,8 +31,8 @@ from embodied.interface import (
 )
 from embodied.teachers.shortest import shortest_action
 
-DO, DONE = INTENTIONS.index("do"), INTENTIONS.index("done")
-ASKS = {name: INTENTIONS.index(name) for name in ("cur", "goal", "sub")}
+DO, DONE = networks.INTENTIONS.index("do"), networks.INTENTIONS.index("done")
+ASKS = {name: networks.INTENTIONS.index(name) for name in ("cur", "goal", "sub")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +54,7 @@ class Reader:
     Each is read by itself, so that what comes out does not depend on who else was listening.
     """
 
-    executor: Executor
+    executor: networks.Executor
     read: dict[tuple[str, int], Reading] = field(default_factory=dict, repr=False)
     """('state' or 'goal', identity of a description) to what was made of it."""
 
@@ -120,7 +113,7 @@ def consider(reader: Reader, observations: Observations, memory: Belief | None) 
     goals = [reader("goal", o.extras.goal_descriptions[-1]) for o in seen]
     together = zip(states, goals, seen, strict=True)
     inputs = collate([percept(words, s.rows, g.rows, o.candidates, o.turn) for s, g, o in together])
-    state, goal = (EncodedDescriptions.together([r.encoded for r in some]) for some in (states, goals))
+    state, goal = (networks.EncodedDescriptions.together([r.encoded for r in some]) for some in (states, goals))
     belief, log_moves = network(memory.carried[rows], inputs, state, goal)
     return Considered(rows, belief, log_moves), memory
 
@@ -142,14 +135,14 @@ def carry(considered: Considered, memory: Belief) -> Belief:
 
 def available(observation: Observation) -> np.ndarray:
     """(5,) bool: the intentions that are possible now."""
-    return np.array([name in ("do", "done") or Intention(name) in observation.can_ask for name in INTENTIONS])
+    return np.array([name in ("do", "done") or Intention(name) in observation.can_ask for name in networks.INTENTIONS])
 
 
 def action_of(intention: int, move: int | None, thought: Thought | None = None) -> Action:
     """An intention as an action of the environment; DO goes to the candidate `move`, or stops where that is None."""
     if intention == DONE or (intention == DO and move is None):
         return Stop(thought)
-    return Move(move, thought) if move is not None else Ask(Intention(INTENTIONS[intention]), thought)
+    return Move(move, thought) if move is not None else Ask(Intention(networks.INTENTIONS[intention]), thought)
 
 
 @dataclass
@@ -183,8 +176,8 @@ class Choice:
 class HariPolicy:
     """The intention policy over its execution policy, as it is judged or as it learns."""
 
-    executor: Executor
-    actor: RecurrentHead
+    executor: networks.Executor
+    actor: networks.RecurrentHead
     sample: bool = True
     """Intentions are drawn from psi; False takes the likeliest. Open in the text: docs/sources.md, S78."""
     choices: list[Choice] | None = field(default=None, repr=False)
@@ -213,7 +206,7 @@ class HariPolicy:
         rows = considered.rows
         seen = [observations[i] for i in rows]
         depth = torch.tensor([len(o.extras.goal_descriptions) for o in seen if o is not None])
-        shown = shown_probabilities(considered.log_moves).clone()
+        shown = networks.shown_probabilities(considered.log_moves).clone()
         inputs = considered.belief.clone(), shown, mind.last[rows], depth
         possible = torch.from_numpy(np.stack([available(o) for o in seen if o is not None]))
         before = (mind.actor[0][rows], mind.actor[1][rows])
@@ -221,13 +214,13 @@ class HariPolicy:
         logits = scores.masked_fill(~possible, -torch.inf)
         p = logits.detach().double().softmax(-1).numpy()
         drawn = [
-            int(rngs[i].choice(len(INTENTIONS), p=p[k])) if self.sample else int(p[k].argmax())
+            int(rngs[i].choice(len(networks.INTENTIONS), p=p[k])) if self.sample else int(p[k].argmax())
             for k, i in enumerate(rows)
         ]
         actions: Actions = [None] * len(observations)
         stops = considered.would_stop
         for k, i in enumerate(rows):
-            thought = Thought(asks=dict(zip(INTENTIONS, p[k].tolist(), strict=True)))
+            thought = Thought(asks=dict(zip(networks.INTENTIONS, p[k].tolist(), strict=True)))
             own = None if stops[k] else considered.move(k)
             move = led.get(k, own) if drawn[k] == DO else None
             actions[i] = action_of(drawn[k], move, thought)
@@ -258,7 +251,7 @@ class PerfectOnSubgoals(HariPolicy):
         return self._choose(observations, considered, led, belief, memory, rngs)
 
 
-def policy_of(agent: HariAgent, *, sample: bool = True) -> HariPolicy:
+def policy_of(agent: networks.HariAgent, *, sample: bool = True) -> HariPolicy:
     """A trained agent as it is judged."""
     kind = PerfectOnSubgoals if agent.config.perfect else HariPolicy
     return kind(agent.executor, agent.actor, sample)

@@ -25,17 +25,8 @@ from embodied.agents.common.imitation import TaskSet
 from embodied.agents.common.session import Options, Progress, Session, descend, episode_seed, run, tasks_of_update
 from embodied.agents.common.tensors import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.weights import Stateful, checksum_of, load_into, weights_digest
+from embodied.agents.hari import networks
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
-from embodied.agents.hari.networks import (
-    INTENTIONS,
-    Executor,
-    HariAgent,
-    RecurrentHead,
-    load_executor,
-    new_executor,
-    new_heads,
-    save,
-)
 from embodied.agents.hari.policy import Choice, policy_of
 from embodied.agents.hari.pretraining import PretrainingData, pretrain
 from embodied.agents.hari.words import feature_words
@@ -52,8 +43,8 @@ MAY_CHANGE = ("iterations", "checkpoint_minutes", "validate_every", "validation_
 
 
 def train(
-    agent: HariAgent,
-    critic: RecurrentHead,
+    agent: networks.HariAgent,
+    critic: networks.RecurrentHead,
     training: TaskSet,
     validation: TaskSet,
     folder: Path,
@@ -75,7 +66,7 @@ def train(
         cost = math.fsum(s.cost for e in episodes for s in e.steps) / len(episodes)
         session.record({"episodes": len(episodes), "cost": cost, **numbers_of(episodes, validation.worlds)})
         if session.improved(-cost):  # what is optimised: the mean cost, task errors included
-            save(agent, session.folder / "best.safetensors", identity)
+            networks.save(agent, session.folder / "best.safetensors", identity)
         return episodes
 
     step = lambda update: train_step(learning, training, update)
@@ -86,7 +77,7 @@ def train(
 class IntentionRun:
     """Owns what changes in a run: the two heads and their optimizers."""
 
-    def __init__(self, agent: HariAgent, critic: RecurrentHead) -> None:
+    def __init__(self, agent: networks.HariAgent, critic: networks.RecurrentHead) -> None:
         self.agent, self.critic = agent, critic
         self.policy = policy_of(agent)
         rate = agent.config.learning_rate
@@ -139,7 +130,7 @@ def chosen(choices: Sequence[Choice], batch: int) -> tuple[Tensor, Tensor]:
     return torch.stack(log_p, 1), torch.stack(entropy, 1)
 
 
-def values(critic: RecurrentHead, choices: Sequence[Choice], batch: int) -> Tensor:
+def values(critic: networks.RecurrentHead, choices: Sequence[Choice], batch: int) -> Tensor:
     """(B, T) V of the costs to come at each step, by the critic's own memory; zero behind the ends."""
     memory, out = critic.begin(batch), []
     for c in choices:
@@ -159,7 +150,7 @@ def _spread(numbers: Tensor, rows: list[int], batch: int) -> Tensor:
 def counts_of(episodes: Sequence[Episode]) -> dict[str, float]:
     """Mean number of each intention per episode; DONE on sub-goals counts as 'done'."""
     chosen = Counter(intention_of(s.action) for e in episodes for s in e.steps)
-    return {name: chosen[name] / len(episodes) for name in INTENTIONS}
+    return {name: chosen[name] / len(episodes) for name in networks.INTENTIONS}
 
 
 def intention_of(action: Action) -> str:
@@ -203,7 +194,7 @@ def task_split_of(data: Dataset, splits: Sequence[str], config: IntentionConfig,
     return TaskSet(places, tasks, make_env)
 
 
-def validation_means(data: Dataset, agent: HariAgent, *, seed: int) -> dict[str, float]:
+def validation_means(data: Dataset, agent: networks.HariAgent, *, seed: int) -> dict[str, float]:
     """The agent's mean number of each intention on validation tasks of all three conditions."""
     ground = task_split_of(data, VALIDATION_CONDITIONS, agent.config, agent.config.validation_tasks)
     with torch.inference_mode():
@@ -225,8 +216,8 @@ def train_execution(
     houses = {t.world for t in source.training}
     places = [source.places[name] for name in sorted(houses)]
     words = feature_words(describer.dense(place, v) for place in places for v in range(len(place.graph.ids)))
-    other = None if init_from is None else load_executor(init_from)
-    executor = new_executor(config, other.words if other else words)
+    other = None if init_from is None else networks.load_executor(init_from)
+    executor = networks.new_executor(config, other.words if other else words)
     if other is not None and init_from is not None:
         load_into(executor.network, other.network.state_dict(), init_from)
     size = sum(p.numel() for p in executor.network.parameters())
@@ -238,10 +229,10 @@ def train_execution(
 
 
 def train_intention(
-    data: Dataset, executor: Executor, config: IntentionConfig, folder: Path, **options: Unpack[Options]
+    data: Dataset, executor: networks.Executor, config: IntentionConfig, folder: Path, **options: Unpack[Options]
 ) -> Progress:
     """Train, or go on training, the intention policy of a run folder over a trained execution policy."""
-    actor, critic = new_heads(config, executor.config.hidden_size)
+    actor, critic = networks.new_heads(config, executor.config.hidden_size)
     training = task_split_of(data, ["train"], config)
     validation = task_split_of(data, VALIDATION_CONDITIONS, config, config.validation_tasks)
     size = sum(p.numel() for p in actor.parameters())
@@ -249,4 +240,4 @@ def train_intention(
     note(f"{len(training.tasks)} tasks in {len(training.worlds)} houses, {size:,} parameters of each head")
     begin = checksum_of(executor.network.state_dict(), {})
     identity = identity_of("embodied.agents.hari.run", settings=config, data=data.digest, begin=begin)
-    return train(HariAgent(executor, actor, config), critic, training, validation, folder, identity, **options)
+    return train(networks.HariAgent(executor, actor, config), critic, training, validation, folder, identity, **options)

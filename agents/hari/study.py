@@ -13,18 +13,10 @@ import numpy as np
 
 from embodied.agents.common.session import Note
 from embodied.agents.common.weights import weights_digest
+from embodied.agents.hari import run
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.networks import INTENTIONS, Executor, HariAgent, load_agent, load_executor
 from embodied.agents.hari.policy import ASKS, DO, DONE, Belief, Reader, action_of, available, carry, consider, policy_of
-from embodied.agents.hari.run import (
-    TEST,
-    VALIDATION_CONDITIONS,
-    intention_of,
-    rules_of,
-    train_execution,
-    train_intention,
-    validation_means,
-)
 from embodied.agents.studies.engine import Measured
 from embodied.agents.studies.episodes import JUDGES, EpisodeStudy
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
@@ -210,7 +202,7 @@ HARI_TABLES: Mapping[str, StudyTable] = {
             _learned("skyline", perfect=True),
         ),
         ("success",),
-        TEST,
+        run.TEST,
         (
             *((_learned("learned"), _learned(rule, rule)) for rule in (RANDOM, SUB_RULE)),
             (_learned(GREEDY, GREEDY), _learned(SUB_RULE, SUB_RULE)),
@@ -222,10 +214,10 @@ HARI_TABLES: Mapping[str, StudyTable] = {
         "Goals on the stack",
         tuple(_learned(f"stack {n}", stack=n) for n in (1, 2, 3)),
         ("success",),
-        VALIDATION_CONDITIONS,
+        run.VALIDATION_CONDITIONS,
         pooled=ACTIONS,
     ),
-    "figure 4.5": StudyTable("Requests by condition", (_learned("learned"),), ACTIONS[:3], VALIDATION_CONDITIONS),
+    "figure 4.5": StudyTable("Requests by condition", (_learned("learned"),), ACTIONS[:3], run.VALIDATION_CONDITIONS),
     "figure 4.5b": StudyTable(
         "Intentions by time step",
         (StudyRow("learned", {}, {"played": "learned", TIMES: True}),),
@@ -240,7 +232,7 @@ HARI_TABLES: Mapping[str, StudyTable] = {
             for c in (0.01, 0.05, 0.1, 0.2, 0.5)
         ),
         ("success", *ACTIONS),
-        VALIDATION_CONDITIONS,
+        run.VALIDATION_CONDITIONS,
         figure=Figure(("success",), "cost of an action", "success (%)", log=True),
     ),
 }
@@ -269,7 +261,7 @@ class HariStudy(EpisodeStudy):
         ood, tables = self.judged_in({}).ood, {}
         for name, table in HARI_TABLES.items():
             splits = [s for s in table.splits if known or s.endswith("_env")]
-            splits += ood if table.splits == TEST else ()
+            splits += ood if table.splits == run.TEST else ()
             tables[name] = dataclasses.replace(table, splits=tuple(splits))
         return tables
 
@@ -285,11 +277,11 @@ class HariStudy(EpisodeStudy):
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Train the execution policy that intention policies use."""
         if self.executor is None:
-            train_execution(dataset_of(self.data, "hari"), self.execution, self._walking(folder).parent, note=note)
+            run.train_execution(dataset_of(self.data, "hari"), self.execution, self._walking(folder).parent, note=note)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         executor = load_executor(self._walking(folder))
-        train_intention(dataset_of(self.data, "hari"), executor, self.settings(train, seed), home, note=note)
+        run.train_intention(dataset_of(self.data, "hari"), executor, self.settings(train, seed), home, note=note)
         return home / "best.safetensors"
 
     def load(self, weights: Path) -> HariAgent:
@@ -298,11 +290,11 @@ class HariStudy(EpisodeStudy):
     def policies(self, agent: HariAgent, judge: Mapping[str, Any], split: str) -> Agent:
         played, data = judge["played"], dataset_of(self.data, "hari")
         none = dict.fromkeys(INTENTIONS, 0.0)
-        means = validation_means(data, agent, seed=self.eval_seeds[0]) if played == RANDOM else none
+        means = run.validation_means(data, agent, seed=self.eval_seeds[0]) if played == RANDOM else none
         return policies(agent, means)[played]
 
     def where(self, agent: HariAgent, judge: Mapping[str, Any], split: str) -> SplitData:
-        return self.judged_in(judge).split(split, rules=rules_of(agent.config))
+        return self.judged_in(judge).split(split, rules=run.rules_of(agent.config))
 
     def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
         return dataset_of(self.eval_data or self.data, "hari")
@@ -328,7 +320,7 @@ def intentions_by_time(episodes: Sequence[Episode], horizon: int) -> dict[str, S
     """'cur at 3': the share of the episodes that run at time step 3 that choose CUR; of each intention and step."""
     totals: dict[str, tuple[list[float], list[float]]] = {}
     for episode in episodes:
-        chosen = [intention_of(s.action) for s in episode.steps[:horizon]]
+        chosen = [run.intention_of(s.action) for s in episode.steps[:horizon]]
         for t in range(horizon):
             for name in INTENTIONS:
                 some, all_ = totals.setdefault(f"{name} at {t + 1}", ([], []))

@@ -6,17 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-from embodied.agents.common.settings import (
-    AtLeastOne,
-    Checked,
-    Limit,
-    NotAll,
-    NotNegative,
-    Positive,
-    RunSettings,
-    Share,
-    Whole,
-)
+from embodied.agents.common import settings
 from embodied.options import Option
 
 STUDENT_LEARNERS = ("adel", "dagger", "binary", "continuous")
@@ -24,32 +14,32 @@ STUDENT_LEARNERS = ("adel", "dagger", "binary", "continuous")
 
 
 @dataclass(frozen=True, kw_only=True)
-class LearnerConfig(RunSettings):
+class LearnerConfig(settings.RunSettings):
     """The defaults are those of the dissertation for REGEX."""
 
     learner: Annotated[str, Option(words=STUDENT_LEARNERS)] = "adel"
     """Learning algorithm: adel (Algorithm 9), dagger, or REINFORCE with a binary or a continuous reward."""
-    iterations: AtLeastOne = 30_000
+    iterations: settings.AtLeastOne = 30_000
     """Updates of the weights."""
-    learning_rate: Positive = 1e-3
+    learning_rate: settings.Positive = 1e-3
     """Learning rate of Adam; REINFORCE uses a tenth of it, as in the dissertation."""
-    mixing: Share = 0.5
+    mixing: settings.Share = 0.5
     """Lambda: the weight of executions from the marginal (Algorithm 9)."""
-    anneal_every: Whole = 0
+    anneal_every: settings.Whole = 0
     """Halve lambda after every so many updates; 0: never (L of Table C.1)."""
-    least_mixing: Share = 0.1
+    least_mixing: settings.Share = 0.1
     """Smallest lambda of annealing."""
-    entropy: NotNegative = 0.1
+    entropy: settings.NotNegative = 0.1
     """Weight of the entropy bonus in REINFORCE."""
-    clip: Positive = 5.0
+    clip: settings.Positive = 5.0
     """Largest gradient norm; the dissertation does not clip (docs/sources.md, S92)."""
-    cooldown: Share = 0.0
+    cooldown: settings.Share = 0.0
     """Share of the updates at the end over which the learning rate falls linearly to zero."""
-    threshold: Share = 0.85
+    threshold: settings.Share = 0.85
     """Sample complexity is the number of training episodes until validation reaches this success (c of Table 3.4)."""
-    validate_every: AtLeastOne = 500
+    validate_every: settings.AtLeastOne = 500
     """Updates between validations."""
-    checkpoint_minutes: Positive = 2.0
+    checkpoint_minutes: settings.Positive = 2.0
 
     @property
     def rate(self) -> float:
@@ -68,24 +58,24 @@ TEACHERS = ("learned", "grammar")
 
 
 @dataclass(frozen=True)
-class TeacherConfig(Checked):
+class TeacherConfig(settings.Checked):
     """Of the simulated teacher of a world; the defaults are the dissertation's for REGEX."""
 
-    hidden_size: AtLeastOne = 512
+    hidden_size: settings.AtLeastOne = 512
     """Width of all networks."""
     teacher: Annotated[str, Option(words=TEACHERS)] = "learned"
     """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1), or 'grammar', the templates
     that word the requests, or the routes of data sets."""
-    candidates: AtLeastOne = 10
+    candidates: settings.AtLeastOne = 10
     """Number of candidate descriptions: the likeliest and sampled ones (Table C.2); in NAV the first that leads the
     executor to the end of the walk is given (docs/sources.md, S93, S141)."""
-    executor_iterations: AtLeastOne = 30_000
+    executor_iterations: settings.AtLeastOne = 30_000
     """Updates of the teacher's executor."""
-    describer_iterations: AtLeastOne = 40_000
+    describer_iterations: settings.AtLeastOne = 40_000
     """Updates of the teacher's describer."""
-    teacher_batch: AtLeastOne = 256
+    teacher_batch: settings.AtLeastOne = 256
     """Examples, or routes, per update of the teacher's networks, and in pre-training."""
-    teacher_rate: Positive = 1e-3
+    teacher_rate: settings.Positive = 1e-3
     """Learning rate of the teacher's networks and of pre-training."""
     data_seed: int = 0
     """Random seed of data, further paths and teacher, which all students share."""
@@ -95,21 +85,21 @@ class TeacherConfig(Checked):
 class RegexConfig(TeacherConfig):
     """The defaults are the dissertation's."""
 
-    items: AtLeastOne = 114_503
+    items: settings.AtLeastOne = 114_503
     """Training examples, each with three requests."""
-    held_out_items: AtLeastOne = 6_429
+    held_out_items: settings.AtLeastOne = 6_429
     """Examples for validation, and for testing, each with one request."""
-    vocabulary: Annotated[int, Limit(lambda x: x >= 1000, "at least 1000")] = 8_000
+    vocabulary: Annotated[int, settings.Limit(lambda x: x >= 1000, "at least 1000")] = 8_000
     """Number of made-up words that rules are applied to."""
-    examples: AtLeastOne = 5
+    examples: settings.AtLeastOne = 5
     """Word pairs per example; a description must fit all of them (J, tau)."""
-    word_size: AtLeastOne = 128
+    word_size: settings.AtLeastOne = 128
     """Width of the embeddings of words of a request."""
-    character_size: AtLeastOne = 32
+    character_size: settings.AtLeastOne = 32
     """Width of the embeddings of letters and of characters of a rule."""
-    unlabeled: AtLeastOne = 20_000
+    unlabeled: settings.AtLeastOne = 20_000
     """Number of unlabelled rules, drawn as those of requests are (docs/sources.md, S140)."""
-    pretraining_iterations: Whole = 10_000
+    pretraining_iterations: settings.Whole = 10_000
     """Updates of the student on unlabelled rules before it learns from descriptions; 0: none, as in the text."""
 
 
@@ -151,27 +141,27 @@ LEARNER_SCALES: dict[str, LearnerConfig] = {
 class NavConfig(TeacherConfig):
     """The defaults are the dissertation's."""
 
-    hidden_size: AtLeastOne = 256
-    candidates: AtLeastOne = 5
-    executor_iterations: AtLeastOne = 20_000
-    describer_iterations: AtLeastOne = 20_000
-    teacher_batch: AtLeastOne = 32
-    teacher_rate: Positive = 1e-4
-    heads: AtLeastOne = 8
+    hidden_size: settings.AtLeastOne = 256
+    candidates: settings.AtLeastOne = 5
+    executor_iterations: settings.AtLeastOne = 20_000
+    describer_iterations: settings.AtLeastOne = 20_000
+    teacher_batch: settings.AtLeastOne = 32
+    teacher_rate: settings.Positive = 1e-4
+    heads: settings.AtLeastOne = 8
     """Attention heads of the describer."""
-    dropout: NotAll = 0.0
+    dropout: settings.NotAll = 0.0
     """Dropout rate of followers in training."""
-    environment_dropout: NotAll = 0.0
+    environment_dropout: settings.NotAll = 0.0
     """Share of feature channels hidden from a follower for a whole training episode (Tan et al. 2019)."""
-    progress_weight: NotNegative = 0.0
+    progress_weight: settings.NotNegative = 0.0
     """Weight of a follower's second loss: to guess which share of the way is left (Ma et al. 2019)."""
-    room_weight: NotNegative = 0.0
+    room_weight: settings.NotNegative = 0.0
     """Weight of a follower's third loss: to name the kinds of the current room and of those ahead."""
-    guided: Share = 0.0
+    guided: settings.Share = 0.0
     """DAgger, and the teacher's executor: share of training steps that the demonstrator takes (Ross et al. 2011)."""
     blind: bool = False
     """Ablation without vision: all features are zero to the student."""
-    more_paths: Whole = 0
+    more_paths: settings.Whole = 0
     """Additional paths per training house, each worded three times."""
 
     def __post_init__(self) -> None:

@@ -16,20 +16,8 @@ from torch import Tensor, nn
 
 from embodied.agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate, tasks_of_update
 from embodied.agents.common.weights import Stateful, load_into, origin_of, read_weights, save_weights
+from embodied.agents.iliad import protocol
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
-from embodied.agents.iliad.protocol import (
-    DescribingTeacher,
-    IliadLesson,
-    Marginal,
-    RequestBatch,
-    RequestWorld,
-    Student,
-    Tasks,
-    adel,
-    dagger,
-    one_request,
-    reinforce,
-)
 from embodied.records import Identity, differences, identity_of
 from embodied.seeds import stream
 
@@ -87,14 +75,14 @@ def teach(
     return network.eval()
 
 
-def drawn(tasks: Tasks, count: int, rng: np.random.Generator) -> list[Any]:
+def drawn(tasks: protocol.Tasks, count: int, rng: np.random.Generator) -> list[Any]:
     """Random tasks."""
     return [tasks[int(i)] for i in rng.integers(len(tasks), size=count)]
 
 
-def asked(tasks: Tasks, rng: np.random.Generator) -> list[str]:
+def asked(tasks: protocol.Tasks, rng: np.random.Generator) -> list[str]:
     """One request of each task."""
-    return [one_request(task, rng=rng) for task in tasks]
+    return [protocol.one_request(task, rng=rng) for task in tasks]
 
 
 BATCH = 256
@@ -105,15 +93,15 @@ BATCH = 256
 class IliadProblem:
     """A world with everybody in it."""
 
-    world: RequestWorld
-    teacher: DescribingTeacher
-    marginal: Marginal
-    student: Student
+    world: protocol.RequestWorld
+    teacher: protocol.DescribingTeacher
+    marginal: protocol.Marginal
+    student: protocol.Student
     """pi_theta, which is judged."""
-    explorer: Student
+    explorer: protocol.Student
     """pi_beta, which only ADEL has."""
-    training: Tasks
-    validation: Tasks
+    training: protocol.Tasks
+    validation: protocol.Tasks
     identity: Identity
     """Parts of a run's identity besides the learner's settings."""
     save: Callable[[Path, Identity], None]
@@ -155,12 +143,12 @@ def train(
     return session.history
 
 
-def success_rate(world: RequestWorld, student: Student, tasks: Tasks) -> float:
+def success_rate(world: protocol.RequestWorld, student: protocol.Student, tasks: protocol.Tasks) -> float:
     """Share of tasks that the student fulfils; see `successes`."""
     return sum(successes(world, student, tasks)) / len(tasks)
 
 
-def successes(world: RequestWorld, student: Student, tasks: Tasks) -> list[bool]:
+def successes(world: protocol.RequestWorld, student: protocol.Student, tasks: protocol.Tasks) -> list[bool]:
     """Which tasks the student fulfils, acting greedily on their first (for held-out tasks, only) request."""
     good: list[bool] = []
     for at in range(0, len(tasks), BATCH):
@@ -193,7 +181,7 @@ class _Learner:
         set_learning_rate(self.optimizer, c.rate, update, c.iterations, c.cooldown)
         tasks = tasks_of_update(self.problem.training, update, c.batch, c.seed)
         rng = stream(c.seed, "iliad", update)
-        batch = RequestBatch(tasks, asked(tasks, rng), rng)
+        batch = protocol.RequestBatch(tasks, asked(tasks, rng), rng)
         with seeded_dropout(c.seed, update):
             lesson = self._learn(batch, mixing_at(c, update), sums)
             descend(lesson.loss, self.optimizer, c.learner, c.clip)
@@ -204,14 +192,16 @@ class _Learner:
             numbers["described"] = sum(d is not None for d in lesson.descriptions) / len(tasks)
         return numbers | ({"reward": float(sum(lesson.rewards))} if lesson.rewards else {})
 
-    def _learn(self, asked: RequestBatch, mixing: float, sums: Mapping[str, float]) -> IliadLesson:
+    def _learn(self, asked: protocol.RequestBatch, mixing: float, sums: Mapping[str, float]) -> protocol.IliadLesson:
         p, c = self.problem, self.config
         if c.learner == "adel":
-            return adel(asked, p.teacher, p.marginal, p.explorer, p.student, mixing)
+            return protocol.adel(asked, p.teacher, p.marginal, p.explorer, p.student, mixing)
         if c.learner == "dagger":
-            return dagger(asked, p.world, p.student)
+            return protocol.dagger(asked, p.world, p.student)
         reward = p.world.success if c.learner == "binary" else p.world.reward
-        return reinforce(asked, reward, p.student, c.entropy, (sums.get("reward", 0.0), sums.get("episodes", 0)))
+        return protocol.reinforce(
+            asked, reward, p.student, c.entropy, (sums.get("reward", 0.0), sums.get("episodes", 0))
+        )
 
 
 def _found(done: int, success: float, config: LearnerConfig, sums: Mapping[str, float]) -> dict[str, float]:

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw
 
+from embodied import interface
 from embodied.action_spaces import door_actions
 from embodied.agents.language_models.client import Message
 from embodied.agents.language_models.completions import object_schema
@@ -28,20 +29,6 @@ from embodied.assistants.descriptions import side
 from embodied.geometry import wrap
 from embodied.gym.sensors import PanoramaStore
 from embodied.house.floor_plan import font
-from embodied.interface import (
-    STEP,
-    VIEW_PITCHES,
-    Action,
-    Ask,
-    Intention,
-    Move,
-    Observation,
-    Open,
-    SeenPlace,
-    Sight,
-    Stop,
-    viewpoint,
-)
 from embodied.navigation.doors import place_named
 from embodied.render.panorama import Panorama
 
@@ -58,39 +45,44 @@ PANORAMA_HEIGHT = 384
 PICTURE_FORMS = ("strip", "panorama")
 
 
-Names = Callable[[Sight], Sequence[tuple[str, float, float]]]
+Names = Callable[[interface.Sight], Sequence[tuple[str, float, float]]]
 """Names what can be seen of a sight, a stand-in for eyes: (object class, yaw in radians, metres), the largest in view
 first."""
 
 
-def oracle_names(worlds: Mapping[str, SeenPlace]) -> Names:
+def oracle_names(worlds: Mapping[str, interface.SeenPlace]) -> Names:
     """The true names of what can be seen: an oracle in place of pictures."""
 
-    def names(sight: Sight) -> list[tuple[str, float, float]]:
-        here = viewpoint(sight)
+    def names(sight: interface.Sight) -> list[tuple[str, float, float]]:
+        here = interface.viewpoint(sight)
         seen = place_named(worlds, here.world).sightings(here.node)
         return [(s.object_class, s.yaw, s.distance) for s in seen if s.pixels >= SMALLEST_SIGHTING][:MOST_NAMES]
 
     return names
 
 
-def actions_by_name(o: Observation) -> dict[str, Action]:
+def actions_by_name(o: interface.Observation) -> dict[str, interface.Action]:
     """Every possible action by the name that a model calls it by."""
     c = o.candidates
-    moves: dict[str, Action] = {
-        (c.words[i] if c.words else f"go {i}"): Move(i) for i in range(len(c)) if bool(c.allowed[i])
+    moves: dict[str, interface.Action] = {
+        (c.words[i] if c.words else f"go {i}"): interface.Move(i) for i in range(len(c)) if bool(c.allowed[i])
     }
-    return {**moves, **door_actions(o), **{f"ask {i.value}": Ask(i) for i in o.can_ask}, "stop": Stop()}
+    return {
+        **moves,
+        **door_actions(o),
+        **{f"ask {i.value}": interface.Ask(i) for i in o.can_ask},
+        "stop": interface.Stop(),
+    }
 
 
-def candidates_in_words(o: Observation, names: Sequence[tuple[str, float, float]] = ()) -> str:
+def candidates_in_words(o: interface.Observation, names: Sequence[tuple[str, float, float]] = ()) -> str:
     """The candidates: 'go 0: straight ahead, towards the sofa; go 1: ...'."""
     if o.candidates.words:
         return ", ".join(w for w, ok in zip(o.candidates.words, o.candidates.allowed) if ok)
-    yaw, clauses = o.turn * STEP, []
+    yaw, clauses = o.turn * interface.STEP, []
     for i, bearing in enumerate(o.candidates.bearing):
         off = [(abs(float(wrap(y - yaw - bearing))), name) for name, y, _ in names]
-        towards = f", towards the {min(off)[1]}" if off and min(off)[0] < STEP / 2 else ""
+        towards = f", towards the {min(off)[1]}" if off and min(off)[0] < interface.STEP / 2 else ""
         slope = float(o.candidates.slope[i])
         stairs = "" if abs(slope) < math.radians(15) else f", {'up' if slope > 0 else 'down'} the stairs"
         door = ", behind a closed door" if i in o.can_open else ""
@@ -98,16 +90,16 @@ def candidates_in_words(o: Observation, names: Sequence[tuple[str, float, float]
     return "; ".join(clauses) or "nowhere"
 
 
-def observation_in_words(o: Observation, names: Sequence[tuple[str, float, float]] = ()) -> str:
+def observation_in_words(o: interface.Observation, names: Sequence[tuple[str, float, float]] = ()) -> str:
     """The place in words: names of what is in sight, and what the kind of task adds."""
-    yaw = o.turn * STEP
+    yaw = o.turn * interface.STEP
     parts = [f"{name} ({side(y - yaw)}, {d:.0f} m)" for name, y, d in names]
     if o.extras is not None:
         parts += o.extras.lines(o.turn)
     return "; ".join(parts) or "nothing that has a name"
 
 
-def pictures_for(o: Observation, panoramas: PanoramaStore, how: str) -> tuple[str, ...]:
+def pictures_for(o: interface.Observation, panoramas: PanoramaStore, how: str) -> tuple[str, ...]:
     """The pictures of an observation as data URLs; the image that is looked for (HANNA) last.
 
     Args:
@@ -124,12 +116,12 @@ def pictures_for(o: Observation, panoramas: PanoramaStore, how: str) -> tuple[st
     return (_url(first), *target)
 
 
-def strip(o: Observation, panorama: Panorama) -> Image.Image:
+def strip(o: interface.Observation, panorama: Panorama) -> Image.Image:
     """The view towards each candidate, side by side, its number in the corner; of VNLA, the view ahead."""
-    yaw, numbers = o.turn * STEP, list(range(len(o.candidates)))
+    yaw, numbers = o.turn * interface.STEP, list(range(len(o.candidates)))
     looks = [(yaw + float(o.candidates.bearing[i]), float(o.candidates.slope[i])) for i in numbers]
     if o.candidates.words or not looks:
-        numbers, looks = [], [(yaw, float(VIEW_PITCHES[12 * (o.tilt + 1)]))]
+        numbers, looks = [], [(yaw, float(interface.VIEW_PITCHES[12 * (o.tilt + 1)]))]
     sheet = Image.new("RGB", (VIEW_SIZE * len(looks) + 4 * (len(looks) - 1), VIEW_SIZE), "white")
     pen = ImageDraw.Draw(sheet)
     for k, (along, pitch) in enumerate(looks):
@@ -140,9 +132,9 @@ def strip(o: Observation, panorama: Panorama) -> Image.Image:
     return sheet
 
 
-def marked_panorama(o: Observation, panorama: Panorama) -> Image.Image:
+def marked_panorama(o: interface.Observation, panorama: Panorama) -> Image.Image:
     """Everything around, the gaze in the middle, a numbered marker towards each candidate."""
-    yaw = o.turn * STEP
+    yaw = o.turn * interface.STEP
     sheet = around(panorama, yaw, PANORAMA_HEIGHT)
     pen = ImageDraw.Draw(sheet)
     if not o.candidates.words:
@@ -231,7 +223,7 @@ class PromptBuilder:
     """One of embodied.agents.language_models.prompts.PICTURE_FORMS."""
     prompt: Prompt = dataclasses.field(default_factory=lambda: agent_prompt())
 
-    def text(self, o: Observation, history: Sequence[str] = ()) -> str:
+    def text(self, o: interface.Observation, history: Sequence[str] = ()) -> str:
         """The observation in words.
 
         Args:
@@ -239,12 +231,12 @@ class PromptBuilder:
         """
         return self.prompt.template.substitute(self._facts(o, history))
 
-    def messages(self, o: Observation, history: Sequence[str] = ()) -> list[Message]:
+    def messages(self, o: interface.Observation, history: Sequence[str] = ()) -> list[Message]:
         """The same as messages, with pictures where there are any."""
         pictures = () if self.panoramas is None else pictures_for(o, self.panoramas, self.pictures)
         return self.prompt.messages(pictures, **self._facts(o, history))
 
-    def _facts(self, o: Observation, history: Sequence[str]) -> dict[str, str]:
+    def _facts(self, o: interface.Observation, history: Sequence[str]) -> dict[str, str]:
         names = () if self.namer is None else self.namer(o.sight)
         return {
             "instruction": o.instruction,
@@ -261,30 +253,30 @@ def agent_prompt(folder: Path | None = None) -> Prompt:
     return read_prompt("agent", AGENT_VARIABLES, folder)
 
 
-def schema_of(o: Observation) -> dict[str, Any]:
+def schema_of(o: interface.Observation) -> dict[str, Any]:
     """A schema of the possible answers."""
     text = lambda most: {"type": "string", "maxLength": most}
-    free = {"question": text(300)} if Intention.FREE in o.can_ask else {}
+    free = {"question": text(300)} if interface.Intention.FREE in o.can_ask else {}
     return object_schema(reason=text(100), action={"type": "string", "enum": list(actions_by_name(o))}, **free)
 
 
-def action_in(o: Observation, value: Mapping[str, Any]) -> Action:
+def action_in(o: interface.Observation, value: Mapping[str, Any]) -> interface.Action:
     """The action that a valid answer names."""
     action = actions_by_name(o)[value["action"]]
-    if isinstance(action, Ask) and action.intention is Intention.FREE:
+    if isinstance(action, interface.Ask) and action.intention is interface.Intention.FREE:
         return dataclasses.replace(action, question=value["question"])
     return action
 
 
-def action_in_words(o: Observation, action: Action) -> str:
+def action_in_words(o: interface.Observation, action: interface.Action) -> str:
     """An action that was taken, for the history."""
-    if isinstance(action, Ask):
+    if isinstance(action, interface.Ask):
         return f"You asked: {action.question or action.intention.value}."
-    if isinstance(action, Stop):
+    if isinstance(action, interface.Stop):
         return "You stopped."
     if o.candidates.words:
         return f"You did {o.candidates.words[action.candidate]}."
     where = side(float(o.candidates.bearing[action.candidate]))
-    if isinstance(action, Move):
+    if isinstance(action, interface.Move):
         return f"You went {where}."
-    return f"You {'opened' if isinstance(action, Open) else 'closed'} the door {where}."
+    return f"You {'opened' if isinstance(action, interface.Open) else 'closed'} the door {where}."

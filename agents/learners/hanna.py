@@ -6,21 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from embodied.agents import options
 from embodied.agents.common.settings import SHIPPED_AGENT
 from embodied.agents.hanna.training_config import EVALUATIONS, HANNA_SCALES, HannaEvaluation, TrainingConfig
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
-from embodied.agents.options import (
-    EVALUATION,
-    TRAINING,
-    Encoded,
-    EpisodeStudyOptions,
-    Seeds,
-    SightedRun,
-    Tables,
-    WithDevice,
-    study_by,
-    training,
-)
 from embodied.options import Count, Settings
 
 if TYPE_CHECKING:
@@ -28,26 +17,26 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HannaTraining(SightedRun):
+class HannaTraining(options.SightedRun):
     """An agent that asks people for help (HANNA), by imitation, on a HANNA data set with features.
 
     Trains an agent by imitation to navigate, to ask for help and to follow it, on data of `embodied features`.
     """
 
     threads: Count = 2
-    config: Annotated[TrainingConfig, Settings(TRAINING, HANNA_SCALES)]
-    evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
+    config: Annotated[TrainingConfig, Settings(options.TRAINING, HANNA_SCALES)]
+    evaluation: Annotated[HannaEvaluation, Settings(options.EVALUATION, EVALUATIONS)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class HannaStudyOptions(EpisodeStudyOptions, Encoded, WithDevice):
+class HannaStudyOptions(options.EpisodeStudyOptions, options.Encoded, options.WithDevice):
     """Agents that ask people for help and follow their routes."""
 
-    tables: Tables
+    tables: options.Tables
     """Make these tables: 4.3, 4.4, 4.5, 4.6 or D.2."""
-    seeds: Seeds = 1
-    config: Annotated[TrainingConfig, Settings(TRAINING, HANNA_SCALES, skip=("training_houses",))]
-    evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
+    seeds: options.Seeds = 1
+    config: Annotated[TrainingConfig, Settings(options.TRAINING, HANNA_SCALES, skip=("training_houses",))]
+    evaluation: Annotated[HannaEvaluation, Settings(options.EVALUATION, EVALUATIONS)]
 
 
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
@@ -67,8 +56,8 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
 register_learner(
     Learner(
         name="hanna",
-        train=(HannaTraining, training("embodied.agents.hanna.agent:train_agent", "hanna")),
-        study=(HannaStudyOptions, study_by("embodied.agents.hanna.study:HannaStudy")),
+        train=(HannaTraining, options.training("embodied.agents.hanna.agent:train_agent", "hanna")),
+        study=(HannaStudyOptions, options.study_by("embodied.agents.hanna.study:HannaStudy")),
         players=players,
         columns=(
             *("success", "strict success", "spl", "navigation error", "requests"),

@@ -6,18 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from embodied.agents import options
 from embodied.agents.common.settings import SHIPPED_VLN, EvaluationSettings
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
-from embodied.agents.options import (
-    EVALUATION,
-    TRAINING,
-    Encoded,
-    EpisodeStudyOptions,
-    SightedRun,
-    Tables,
-    study_by,
-    training,
-)
 from embodied.agents.vln.config import MEASURES, VLN_SCALES, FollowerSettings
 from embodied.options import Count, Settings
 
@@ -26,23 +17,27 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FollowerTraining(SightedRun):
+class FollowerTraining(options.SightedRun):
     """An agent that follows route instructions, on a VLN or HANNA data set with features (imitation)."""
 
-    config: Annotated[FollowerSettings, Settings(TRAINING, VLN_SCALES)]
-    evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings(), skip=("ask_threshold",))]
+    config: Annotated[FollowerSettings, Settings(options.TRAINING, VLN_SCALES)]
+    evaluation: Annotated[
+        EvaluationSettings, Settings(options.EVALUATION, EvaluationSettings(), skip=("ask_threshold",))
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
-class VlnStudyOptions(EpisodeStudyOptions, Encoded):
+class VlnStudyOptions(options.EpisodeStudyOptions, options.Encoded):
     """Agents that follow route instructions."""
 
-    tables: Tables
+    tables: options.Tables
     """Make this table: followers."""
     others: Count = 1
     """Training seeds of all rows but the first."""
-    config: Annotated[FollowerSettings, Settings(TRAINING, VLN_SCALES, skip=("forcing", "blind", "wordless"))]
-    evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings(), skip=("ask_threshold",))]
+    config: Annotated[FollowerSettings, Settings(options.TRAINING, VLN_SCALES, skip=("forcing", "blind", "wordless"))]
+    evaluation: Annotated[
+        EvaluationSettings, Settings(options.EVALUATION, EvaluationSettings(), skip=("ask_threshold",))
+    ]
 
 
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
@@ -67,9 +62,9 @@ register_learner(
         name="vln",
         train=(
             "Agents that follow route instructions.",
-            {"follower": (FollowerTraining, training("embodied.agents.vln.study:train_follower", "vln"))},
+            {"follower": (FollowerTraining, options.training("embodied.agents.vln.study:train_follower", "vln"))},
         ),
-        study=(VlnStudyOptions, study_by("embodied.agents.vln.study:VlnStudy")),
+        study=(VlnStudyOptions, options.study_by("embodied.agents.vln.study:VlnStudy")),
         players=players,
         columns=MEASURES,
         shipped=SHIPPED_VLN,

@@ -7,18 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from embodied.agents import options
 from embodied.agents.common.settings import SHIPPED_VNLA, EvaluationSettings
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
-from embodied.agents.options import (
-    EVALUATION,
-    TRAINING,
-    Encoded,
-    EpisodeStudyOptions,
-    SightedRun,
-    Tables,
-    study_by,
-    training,
-)
 from embodied.agents.vnla.config import VNLA_SCALES, VnlaSettings
 from embodied.options import Count, Settings
 
@@ -27,27 +18,27 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class VnlaTraining(SightedRun):
+class VnlaTraining(options.SightedRun):
     """An agent that asks an advisor within a budget (VNLA), by imitation, on a VNLA data set with features.
 
     Trains an agent by imitation to navigate by one view, to ask an advisor within a budget and to follow the advice.
     """
 
     threads: Count = 2
-    config: Annotated[VnlaSettings, Settings(TRAINING, VNLA_SCALES)]
-    evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
+    config: Annotated[VnlaSettings, Settings(options.TRAINING, VNLA_SCALES)]
+    evaluation: Annotated[EvaluationSettings, Settings(options.EVALUATION, EvaluationSettings())]
 
 
 @dataclass(frozen=True, kw_only=True)
-class VnlaStudyOptions(EpisodeStudyOptions, Encoded):
+class VnlaStudyOptions(options.EpisodeStudyOptions, options.Encoded):
     """Agents that ask an advisor within a budget."""
 
-    tables: Tables
+    tables: options.Tables
     """Make this table: askers."""
     others: Count | None = None
     """Training seeds of all rows but the learned asker's (default: --seeds)."""
-    config: Annotated[VnlaSettings, Settings(TRAINING, VNLA_SCALES, skip=("asker", "rules"))]
-    evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
+    config: Annotated[VnlaSettings, Settings(options.TRAINING, VNLA_SCALES, skip=("asker", "rules"))]
+    evaluation: Annotated[EvaluationSettings, Settings(options.EVALUATION, EvaluationSettings())]
 
 
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
@@ -71,8 +62,8 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
 register_learner(
     Learner(
         name="vnla",
-        train=(VnlaTraining, training("embodied.agents.vnla.study:train_agent", "vnla")),
-        study=(VnlaStudyOptions, study_by("embodied.agents.vnla.study:VnlaStudy")),
+        train=(VnlaTraining, options.training("embodied.agents.vnla.study:train_agent", "vnla")),
+        study=(VnlaStudyOptions, options.study_by("embodied.agents.vnla.study:VnlaStudy")),
         players=players,
         columns=(
             *("success", "strict success", "room success", "navigation error"),

@@ -21,6 +21,7 @@ from typing import Any, ClassVar
 
 import joblib
 
+from embodied import records
 from embodied.agents.common.session import Note
 from embodied.agents.common.tensors import use_threads
 from embodied.agents.common.weights import read_checkpoint, weights_digest
@@ -28,17 +29,6 @@ from embodied.agents.studies.tables import StudyRow, StudyTable, draw, page
 from embodied.assets.cache import digest, write_bytes, write_json
 from embodied.evaluation.tables import Samples, in_percent, interval, less
 from embodied.locks import locked
-from embodied.records import (
-    CODE,
-    MAKERS,
-    Identity,
-    finished,
-    from_plain,
-    identity_of,
-    key_of,
-    read_finished,
-    write_finished,
-)
 
 PRINTED = Path(__file__).parent / "data" / "printed.json"
 """Numbers of papers: table to row to column, in the table's own units."""
@@ -75,7 +65,7 @@ class StudyLearner:
     def prepare_seed(self, rows: Sequence[StudyRow], seed: int, folder: Path, note: Note) -> None:
         """Make what the runs of a seed share; seeds are made side by side."""
 
-    def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Identity:
+    def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> records.Identity:
         """All that a trained run depends on; `folder` is the study's, for what `prepare` made."""
         raise NotImplementedError
 
@@ -196,13 +186,13 @@ def _run(learner: StudyLearner, out: Path, note: Note, job: _Job) -> str:
         if weights is None:
             weights = learner.train(row.train, seed, out, home, lambda line: note(f"{name}: {line}"))
             facts = {"weights": os.path.relpath(weights, home), "seconds": _processor(home)}
-            write_finished(home / "trained.json", identity, facts)
+            records.write_finished(home / "trained.json", identity, facts)
     for judged, split in job.judgings.values():
         path, identity_of_judging = _judged(learner, home, weights, judged, split)
-        if finished(path, identity_of_judging) is None:
+        if records.finished(path, identity_of_judging) is None:
             counts = learner.judge(weights, judged, split, seed, out, path.with_suffix(""))
             samples = {k: dataclasses.asdict(_storable(v)) for k, v in counts.items()}
-            write_finished(path, identity_of_judging, {"samples": samples})
+            records.write_finished(path, identity_of_judging, {"samples": samples})
     return f"{name}: judged"
 
 
@@ -211,12 +201,12 @@ def _home(learner: StudyLearner, out: Path, row: StudyRow, seed: int) -> Path:
     if row.train is None:
         return out / "runs" / "without_learning"
     settings = "_".join(f"{k}_{v}" for k, v in sorted(row.train.items())) or "as_it_is"
-    return out / "runs" / f"{_slug(settings)}_seed_{seed}_{key_of(learner.trained(row.train, seed, out))}"
+    return out / "runs" / f"{_slug(settings)}_seed_{seed}_{records.key_of(learner.trained(row.train, seed, out))}"
 
 
-def _weights(home: Path, identity: Identity) -> Path | None:
+def _weights(home: Path, identity: records.Identity) -> Path | None:
     """Of a run that was trained under this identity."""
-    done = finished(home / "trained.json", identity, (CODE, MAKERS))
+    done = records.finished(home / "trained.json", identity, (records.CODE, records.MAKERS))
     return home / str(done["weights"]) if done and (home / str(done["weights"])).exists() else None
 
 
@@ -225,9 +215,9 @@ def _judged(
 ) -> tuple[Path, dict[str, Any]]:
     """The file of a judgement, and its identity."""
     about = {"weights": weights and _digest_of(weights, weights.stat().st_mtime_ns), "judge": row.judge, "split": split}
-    identity = identity_of(*learner.judges, **about, **learner.judged(row, split))
+    identity = records.identity_of(*learner.judges, **about, **learner.judged(row, split))
     how = "_".join(map(str, row.judge.values()))
-    return home / "judged" / f"{_slug(f'{split} {how}')}_{key_of(identity)}.json", identity
+    return home / "judged" / f"{_slug(f'{split} {how}')}_{records.key_of(identity)}.json", identity
 
 
 @functools.lru_cache(maxsize=256)
@@ -295,15 +285,19 @@ def result(
             columns[column] = {"key": column, "title": title, "unit": "%" if in_percent(metric) else ""}
         for seed in learner.seeds(row) if row.train is not None else ():
             home = _home(learner, out, row, seed)
-            identity, facts = read_finished(home / "trained.json")
+            identity, facts = records.read_finished(home / "trained.json")
             runs.setdefault(row.label, []).append(home.name)
             seconds[home.name] = float(facts["seconds"])  # several rows may judge one run
-            codes = {k: identity.get(k) for k in (MAKERS, CODE)}
+            codes = {k: identity.get(k) for k in (records.MAKERS, records.CODE)}
         shown.append({"label": row.label, "values": values, "printed": printed.get("rows", {}).get(row.label, {})})
     notes = [*(f"Not run: {', '.join(missing)}." for _ in missing[:1]), *_comparisons(learner, table, out, rows)]
     if sum(seconds.values()) > 0:  # learners of seconds count none
         notes.append(f"Processor time of training: {sum(seconds.values()) / 3600:.2f} hours.")
-    identity = {"judged": identity_of(*learner.judges), "trained": codes or identity_of(*learner.judges), "runs": runs}
+    identity = {
+        "judged": records.identity_of(*learner.judges),
+        "trained": codes or records.identity_of(*learner.judges),
+        "runs": runs,
+    }
     identity |= {"settings": learner.about()}
     return {
         "table": key,
@@ -352,10 +346,10 @@ def _samples(learner: StudyLearner, row: StudyRow, split: str, out: Path) -> lis
         if row.train is not None and (weights := _weights(home, learner.trained(row.train, seed, out))) is None:
             return None
         path, identity = _judged(learner, home, weights, row, split)
-        body = finished(path, identity)
+        body = records.finished(path, identity)
         if body is None:
             return None
-        counts.append({k: from_plain(Samples, v, f"{path}: {k}") for k, v in body["samples"].items()})
+        counts.append({k: records.from_plain(Samples, v, f"{path}: {k}") for k, v in body["samples"].items()})
     return counts
 
 

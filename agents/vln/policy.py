@@ -15,16 +15,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from embodied import interface
+from embodied.agents.common import tensors
 from embodied.agents.common.imitation import About, SightedAgent
-from embodied.agents.common.tensors import (
-    IGNORE,
-    Chooser,
-    Rows,
-    RunningRows,
-    choose_at,
-    choose_greedily,
-    hidden_channels,
-)
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.common.weights import check_features
 from embodied.agents.hanna.attention import DotAttend, action_index, candidate_rows, orientation
@@ -32,19 +25,6 @@ from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vln.config import FollowerSettings
 from embodied.assets.records import ROOM_KINDS
 from embodied.geometry import wrap
-from embodied.interface import (
-    VIEW_PITCHES,
-    VIEW_YAWS,
-    Actions,
-    Move,
-    Observation,
-    Observations,
-    Rngs,
-    Situation,
-    Situations,
-    Stop,
-    Thought,
-)
 from embodied.teachers.shortest import shortest_of
 
 SPREAD = 0.15
@@ -66,7 +46,7 @@ class FollowerViews:
 
 
 @dataclass(frozen=True, eq=False)
-class FollowerState(Rows):
+class FollowerState(tensors.Rows):
     """The instructions of B agents, read, and what they remember of the way."""
 
     words: Tensor
@@ -146,7 +126,7 @@ class FollowerNetwork(nn.Module):
         return -self.drawn * ((done - (1 - left[:, None])) / SPREAD) ** 2 / 2
 
 
-Guided = Callable[[Situation, np.random.Generator], bool]
+Guided = Callable[[interface.Situation, np.random.Generator], bool]
 """True where the teacher acts in the follower's place."""
 
 
@@ -164,7 +144,7 @@ class VlnMoment:
 
 
 @dataclass(frozen=True, eq=False)
-class VlnMemory(RunningRows):
+class VlnMemory(tensors.RunningRows):
     """The policy's state between steps; rows belong to the episodes that still run."""
 
     heard: FollowerState
@@ -177,26 +157,28 @@ class VlnPolicy:
     network: FollowerNetwork
     vocabulary: Vocabulary
     bank: FeatureBank
-    choose: Chooser = choose_greedily
+    choose: tensors.Chooser = tensors.choose_greedily
     instruction_length: int = 80
     wordless: bool = False
     """True if the instruction is empty to it."""
     environment_dropout: float = 0.0
     """Share of feature channels that an episode does not see at all (Tan et al. 2019). For training."""
 
-    def act(self, observations: Observations, memory: VlnMemory | None, *, rngs: Rngs) -> tuple[Actions, VlnMemory]:
+    def act(
+        self, observations: interface.Observations, memory: VlnMemory | None, *, rngs: interface.Rngs
+    ) -> tuple[interface.Actions, VlnMemory]:
         """One step of every running episode; see embodied.interface.Policy."""
         return self.play(observations, None, memory, rngs=rngs)
 
     def play(
         self,
-        observations: Observations,
-        situations: Situations | None,
+        observations: interface.Observations,
+        situations: interface.Situations | None,
         memory: VlnMemory | None,
         *,
-        rngs: Rngs,
+        rngs: interface.Rngs,
         guided: Guided | None = None,
-    ) -> tuple[Actions, VlnMemory]:
+    ) -> tuple[interface.Actions, VlnMemory]:
         """One step of every running episode.
 
         Args:
@@ -205,7 +187,7 @@ class VlnPolicy:
         """
         positions = tuple(i for i, o in enumerate(observations) if o is not None)
         seen = [o for o in observations if o is not None]
-        actions: Actions = [None] * len(observations)
+        actions: interface.Actions = [None] * len(observations)
         if not seen:
             assert memory is not None
             return actions, memory.keep(positions)
@@ -227,23 +209,23 @@ class VlnPolicy:
                     numbers = [wanted if guided(s, rngs[p]) else own for own, wanted, s, p in drawn]
             taken = outputs.tokens[torch.arange(len(seen)), torch.tensor(numbers)]
         for position, number, chance, o in zip(positions, numbers, chances, seen, strict=True):
-            thought = Thought(np.append(chance[1 : 1 + len(o.candidates)], chance[0]))
-            actions[position] = Stop(thought) if number == 0 else Move(number - 1, thought)
+            thought = interface.Thought(np.append(chance[1 : 1 + len(o.candidates)], chance[0]))
+            actions[position] = interface.Stop(thought) if number == 0 else interface.Move(number - 1, thought)
         return actions, dataclasses.replace(memory, heard=dataclasses.replace(heard, taken=taken))
 
-    def _begin(self, positions: tuple[int, ...], seen: Sequence[Observation]) -> VlnMemory:
+    def _begin(self, positions: tuple[int, ...], seen: Sequence[interface.Observation]) -> VlnMemory:
         device = self.network.left.weight.device
         texts = ["" if self.wordless else o.instruction for o in seen]
         words = torch.from_numpy(self.vocabulary.batch(texts, self.instruction_length)).to(device)
-        channels = hidden_channels(len(seen), self.bank.size, self.environment_dropout, device)
+        channels = tensors.hidden_channels(len(seen), self.bank.size, self.environment_dropout, device)
         return VlnMemory(positions=positions, heard=self.network.begin(words), channels=channels)
 
-    def _look(self, seen: Sequence[Observation], channels: Tensor | None) -> FollowerViews:
+    def _look(self, seen: Sequence[interface.Observation], channels: Tensor | None) -> FollowerViews:
         views = self.bank.gather([o.sight for o in seen])  # (k, 36, D)
         views = views if channels is None else views * channels[:, None]
         view, angles, mask = candidate_rows(seen)
-        yaws = wrap(VIEW_YAWS - np.array([o.turn for o in seen])[:, None] * (np.pi / 6)).astype(np.float32)
-        pitches = np.broadcast_to(VIEW_PITCHES.astype(np.float32), yaws.shape)
+        yaws = wrap(interface.VIEW_YAWS - np.array([o.turn for o in seen])[:, None] * (np.pi / 6)).astype(np.float32)
+        pitches = np.broadcast_to(interface.VIEW_PITCHES.astype(np.float32), yaws.shape)
         towards = views[torch.arange(len(seen))[:, None], torch.from_numpy(view[:, 1:])]
         return FollowerViews(
             torch.cat([views, _directions(views, yaws, pitches)], -1),
@@ -256,10 +238,10 @@ def _directions(like: Tensor, yaws: np.ndarray, pitches: np.ndarray) -> Tensor:
     return orientation(torch.tensor(yaws, device=like.device), torch.tensor(pitches, device=like.device), COPIES)
 
 
-def _moment(outputs: FollowerOutputs, situations: Sequence[Situation]) -> VlnMoment:
+def _moment(outputs: FollowerOutputs, situations: Sequence[interface.Situation]) -> VlnMoment:
     device = outputs.moves.device
     moves, left = [], []
-    rooms = torch.full(outputs.moves.shape, IGNORE)
+    rooms = torch.full(outputs.moves.shape, tensors.IGNORE)
     for row, s in enumerate(situations):
         graph, house, goal = s.world.graph, s.world.house, s.targets
         moves.append(action_index(shortest_of(s)))
@@ -292,7 +274,7 @@ class VlnAgent(SightedAgent):
             self.network,
             self.vocabulary,
             bank.blind() if config.blind else bank,
-            choose=choose_at(self.about.evaluation.evaluation_temperature),
+            choose=tensors.choose_at(self.about.evaluation.evaluation_temperature),
             instruction_length=config.instruction_length,
             wordless=config.wordless,
         )
