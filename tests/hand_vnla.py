@@ -8,7 +8,7 @@ from hand_worlds import grid_world
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import Split
-from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
+from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.study import VnlaAbout, VnlaAgent
 from embodied.kinds.shipped.vnla import VNLA
 from embodied.kinds.task_kind import EnvInputs
@@ -50,7 +50,10 @@ def split_under(rules: str, count=24) -> Split:
 
 def lesson(config: VnlaSettings = TINY):
     """An untrained agent, what it learns from and what it is validated on."""
-    training, validation = split_under(TRAINED_UNDER[config.rules]), split_under(config.rules)
+    training, validation = (
+        split_under("direct" if config.rules == "indirect" else config.rules),
+        split_under(config.rules),
+    )
     words = build_vocabulary(
         [*(t.request for t in training.tasks), "turn left , go forward 2 3 4 steps . look up down"]
     )

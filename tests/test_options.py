@@ -54,7 +54,7 @@ LEARN = ("--data", "d", "--out", "o")
         (("train", "hanna", *LEARN, "--validation-tasks", "0"), "validation_tasks must be at least 1"),
         (("train", "hanna", *LEARN, "--evaluation-temperature", "nan"), "evaluation_temperature must be"),
         (("train", "hanna", *LEARN, "--learning-rate", "inf"), "learning_rate must be positive and finite"),
-        (("train", "vision", *LEARN, "--network", "nope"), "network should be one of"),
+        (("train", "vision", *LEARN, "--network", "nope"), "network must be one of"),
         (("train", "vision", *LEARN, "--epochs", "0"), "epochs must be at least 1"),
         (("dataset", "find", "--out", "x", "--pictures", "unlit", "--size", "-5"), "--size: should be"),
         (("dataset", "find", "--out", ""), "--out: should be a path, got an empty word"),

@@ -109,7 +109,7 @@ def load_into(network: nn.Module, tensors: Mapping[str, Tensor], path: Path) -> 
 
 
 WEIGHTS_FORMAT = "embodied-weights-1"
-RETIRED = ("varied_words", "word_vectors", "ask_rules")
+RETIRED = ("varied_words", "word_vectors", "ask_rules", "asker", "turn_to_agent")
 """Settings of earlier versions that files may hold and that change nothing."""
 T = TypeVar("T")
 

@@ -86,7 +86,6 @@ class HannaAgent(SightedAgent):
             choose=choose_at(judged.evaluation_temperature),
             ask_rule=rule,
             instruction_length=config.instruction_length,
-            turn_to_agent=config.turn_to_agent,
             read_assistance=config.read_assistance,
         )
         return MapPolicy(policy, judged.revisit_weight, judged.use_goal_image, judged.frontier_discount)

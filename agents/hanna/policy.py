@@ -62,9 +62,6 @@ class HannaPolicy:
     choose: Chooser = choose_greedily
     ask_rule: HannaAskRule = ask_greedily
     instruction_length: int = 50
-    turn_to_agent: bool = True
-    """Rows of views begin at the agent's own heading. The authors' program keeps them absolute
-    (docs/sources.md, S29), which tells the agent where east is; D.1 leaves the order open, a robot has no compass."""
     read_assistance: bool = True
     """False: on a route the text is empty, 'target image only' of Table 4.4."""
     learns: bool = False
@@ -163,12 +160,11 @@ class HannaPolicy:
         facing = attention.orientation(send(angles[0]), send(angles[1]), attention.COPIES)  # docs/sources.md, S27
         exists = torch.arange(most, device=device)[:, None] > 0  # stop and padding are zero vectors
         actions = torch.cat([looks, facing], -1) * (exists & send(mask)[..., None])
-        if self.turn_to_agent:
-            views_of_turn = np.arange(attention.VIEWS)[None]
-            order = send(
-                views_of_turn // attention.HEADINGS * attention.HEADINGS + (views_of_turn + turns) % attention.HEADINGS
-            )  # (k, 36)
-            current, target = current[rows, order], target[rows, order]
+        # The authors' program keeps rows of views absolute (docs/sources.md, S29), which tells the agent where east is;
+        # D.1 leaves the order open, a robot has no compass: they begin at the agent's own heading.
+        absolute = np.arange(attention.VIEWS)[None]
+        order = absolute // attention.HEADINGS * attention.HEADINGS + (absolute + turns) % attention.HEADINGS  # (k, 36)
+        current, target = current[rows, send(order)], target[rows, send(order)]
         return attention.Percept(
             tokens=send(np.stack([self.encode(o) for o in observations])),
             new_task=send(np.array([o.time_on_task == 0 for o in observations])),

@@ -119,9 +119,6 @@ class TrainingConfig(settings.ImitationSettings):
     """Predict the reasons for asking, too; False: ablation of Table D.2."""
     similarity_attention: bool = True
     """Attend by cosine similarity; False: ablation of Table D.2 (beta = 0)."""
-    turn_to_agent: bool = True
-    """Order the views from the agent's heading on; False: in absolute order, as in the authors' program
-    (docs/sources.md, S29)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,7 +37,7 @@ class VnlaStudyOptions(options.EpisodeStudyOptions, options.Encoded):
     """Make this table: askers."""
     others: Count | None = None
     """Training seeds of all rows but the learned asker's (default: --seeds)."""
-    config: Annotated[VnlaSettings, Settings(options.TRAINING, VNLA_SCALES, skip=("asker", "rules"))]
+    config: Annotated[VnlaSettings, Settings(options.TRAINING, VNLA_SCALES, skip=("rules",))]
     evaluation: Annotated[EvaluationSettings, Settings(options.EVALUATION, EvaluationSettings())]
 
 

@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
 from embodied.agents.common.settings import AtLeastOne, ImitationSettings, NotAll, Whole
 from embodied.options import Option
 
-ASKERS = ("none", "first", "random", "teacher", "learned")
-"""Who decides when to ask (docs/sources.md, S51)."""
-TRAINED_UNDER: Mapping[str, str] = {
-    "indirect": "direct",
-    "direct": "direct",
-    "direct-mute": "direct-mute",
-    "algorithm-6": "algorithm-6",
-}
-"""Rule of play that an agent is judged under, to that which it is trained under: in training the advisor's actions
-replace the learner's while what it said is in force, as in the program (docs/sources.md, S112)."""
+RULES = ("indirect", "direct", "direct-mute", "algorithm-6")
+"""Rules of play (embodied.envs.vnla)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,12 +34,11 @@ class VnlaSettings(ImitationSettings):
     """How many updates, at the start, only teach to read panoramas."""
     batch: AtLeastOne = 100
     """Episodes per update."""
-    asker: Annotated[str, Option(words=ASKERS)] = "learned"
-    """Who decides when to ask, in training and evaluation: 'none', 'first', 'random', 'teacher' or 'learned'."""
     blind: bool = False
     """Ablation without vision: all features are zero."""
-    rules: Annotated[str, Option(words=tuple(TRAINED_UNDER))] = "indirect"
-    """Rule of play in evaluation: indirect, direct, direct-mute or algorithm-6."""
+    rules: Annotated[str, Option(words=RULES)] = "indirect"
+    """Rule of play in evaluation. An agent of 'indirect' is trained under 'direct': the advisor's actions replace the
+    learner's while what it said is in force, as in the program (docs/sources.md, S112)."""
     validate_every: AtLeastOne = 1000
     """Updates between validations."""
 

@@ -39,7 +39,7 @@ from embodied.interface import (
     Thought,
 )
 from embodied.policies.baselines import random_times
-from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason
+from embodied.teachers.vnla import VnlaTeacher, ask_reason
 
 SURE = 0.6
 """Chance from which on it stops in evaluation."""
@@ -108,14 +108,14 @@ class VnlaPolicy:
         memory: VnlaMemory | None,
         *,
         rngs: Rngs,
-        rules: AskRules | None = None,
+        as_teacher: bool = False,
         teacher: VnlaTeacher | None = None,
     ) -> tuple[Actions, VnlaMemory]:
         """One step of every running episode.
 
         Args:
           situations: of the episodes, for 'random' and for the teacher; None without.
-          rules: of the asking teacher; the learned asker asks when that would, as in training.
+          as_teacher: the learned asker asks when the asking teacher would, as in training.
           teacher: whose labels are kept with what was said, with its gradients.
         """
         running = [(i, o) for i, o in enumerate(observations) if o is not None]
@@ -133,7 +133,7 @@ class VnlaPolicy:
             asking = []
             for row in able:
                 place = positions[row]
-                if self._wants(seen[row], now[row], thoughts[row], memory.times[row], rules):
+                if self._wants(seen[row], now[row], thoughts[row], memory.times[row], as_teacher):
                     actions[place] = Ask(seen[row].can_ask[0], thoughts[row])
                     asking.append(row)
             acting = [row for row in range(len(seen)) if row not in asking]
@@ -155,13 +155,13 @@ class VnlaPolicy:
         return actions, dataclasses.replace(memory, previous_ask=previous_ask, before=before)
 
     def _wants(
-        self, o: Observation, s: Situation | None, thought: Thought, times: frozenset[int], rules: AskRules | None
+        self, o: Observation, s: Situation | None, thought: Thought, times: frozenset[int], as_teacher: bool
     ) -> bool:
         """True to ask now, where that is possible."""
         if self.asker == "random":
             return o.time in times
-        if rules is not None and s is not None and self.asker in ("teacher", "learned"):
-            return ask_reason(s, thought, rules) is not None
+        if as_teacher and s is not None and self.asker in ("teacher", "learned"):
+            return ask_reason(s, thought) is not None
         return self.asker == "first" or (self.asker == "learned" and (thought.asks or {})["help"] > self.ask_threshold)
 
     def start(
@@ -260,7 +260,7 @@ class VnlaPolicy:
 
 def for_training(policy: VnlaPolicy, teacher: VnlaTeacher) -> Supervised:
     """The networks as they learn: moves are sampled, the learned asker asks when its teacher would."""
-    return Supervised(dataclasses.replace(policy, choose=choose_sampled), {"rules": teacher.rules, "teacher": teacher})
+    return Supervised(dataclasses.replace(policy, choose=choose_sampled), {"as_teacher": True, "teacher": teacher})
 
 
 def carried_out(before: Observation, now: Observation) -> int:
@@ -303,7 +303,7 @@ def _moment(
     """Decisions beside the teacher's: whether to ask by the first pass, where to go by the second."""
     there = [s for s in situations if s is not None]
     assert len(there) == len(situations), "a teacher sees situations"
-    wished = [int(ask_reason(there[row], thoughts[row], teacher.rules) is not None) for row in able]
+    wished = [int(ask_reason(there[row], thoughts[row]) is not None) for row in able]
     wanted = [
         STOP if _arrived(s := there[row]) or isinstance(a := teacher.reference(s), Stop) else a.candidate
         for row in acting

@@ -33,7 +33,7 @@ from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy, Split, TrainingData
-from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
+from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.looking import lessons_of, reading_loss
 from embodied.agents.vnla.network import VnlaNetwork
 from embodied.agents.vnla.policy import VnlaMoment, VnlaPolicy, for_training
@@ -44,7 +44,7 @@ from embodied.kinds.shipped.vnla import VNLA
 from embodied.language.plain_language import PlainLanguage
 from embodied.records import identity_of
 from embodied.seeds import stream
-from embodied.teachers.vnla import AskRules, VnlaTeacher
+from embodied.teachers.vnla import VnlaTeacher
 
 WITHOUT_LEARNING = ("random walk", "listener, random", "listener, teacher", "shortest")
 TEACHER = "learned, asks as its teacher"
@@ -73,11 +73,11 @@ class VnlaAgent(SightedAgent):
     def network_of(about: VnlaAbout) -> VnlaNetwork:
         return VnlaNetwork(about.config, len(about.words), about.feature_size)
 
-    def policy(self, bank: FeatureBank, asker: str | None = None) -> VnlaPolicy:
+    def policy(self, bank: FeatureBank, asker: str = "learned") -> VnlaPolicy:
         """The networks acting as they are judged.
 
         Args:
-          asker: another than that of its training.
+          asker: who decides when to ask: 'learned', or one of ASKED (docs/sources.md, S51).
 
         Raises:
           ValueError: features of another encoder.
@@ -88,7 +88,7 @@ class VnlaAgent(SightedAgent):
             self.network,
             self.vocabulary,
             bank.blind() if config.blind else bank,
-            asker=asker or config.asker,
+            asker=asker,
             ask_threshold=judged.ask_threshold,
             choose=choose_at(judged.evaluation_temperature),
             instruction_length=config.instruction_length,
@@ -109,9 +109,9 @@ class VnlaAgent(SightedAgent):
             return VNLA.agent(row)
         if row in BLIND:
             return self.player(bank.blind(), BLIND[row])
-        policy = self.policy(bank, None if row in (LEARNED, DIRECT) else ASKED[row])
+        policy = self.policy(bank, ASKED.get(row, "learned"))
         shown = policy.asker in ("random", "teacher")
-        return Supervised(policy, {"rules": AskRules()}) if shown else policy
+        return Supervised(policy, {"as_teacher": True}) if shown else policy
 
 
 class VnlaLearner(imitation.ImitationLearner):
@@ -147,8 +147,7 @@ class VnlaLearner(imitation.ImitationLearner):
             **imitation.played(episodes, self.training.worlds),
             **imitation.asked(episodes, asks, wished),
         }
-        loss = losses[0] + losses[1] if self.config.asker == "learned" else losses[0]
-        return imitation.BatchLoss(losses, loss, numbers)
+        return imitation.BatchLoss(losses, losses[0] + losses[1], numbers)
 
     def evaluated_agent(self, split: Split) -> Agent:
         return self.agent.player(split.bank)
@@ -179,7 +178,7 @@ def train_agent(
 ) -> Progress:
     """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
     houses = config.training_houses or None
-    training = source.split("train", houses=houses, rules=TRAINED_UNDER[config.rules])
+    training = source.split("train", houses=houses, rules="direct" if config.rules == "indirect" else config.rules)
     validation = source.split("val_unseen", limit=config.validation_tasks, rules=config.rules)
     words = vocabulary_of(source.data, houses)
     agent = VnlaAgent.new(source.about(VnlaAbout, config, evaluation, words))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -143,21 +142,12 @@ def pose_of(state: int) -> interface.Pose:
     return interface.Pose(node, view % interface.TURNS, view // interface.TURNS - 1)
 
 
-@dataclass(frozen=True)
-class AskRules:
-    """Thresholds of the help-request teacher (docs/sources.md, S50)."""
-
-    deviate: float = 8.0
-    """(a) metres from the shortest path."""
-    uncertain: float = 1.0
-    """(b) nats below the entropy of the uniform distribution over the six actions."""
-    unmoved: int = 9
-    """(c) equal entries at the end of the trail."""
+DEVIATE, UNCERTAIN, UNMOVED = 8.0, 1.0, 9
+"""Thresholds of the help-request teacher (docs/sources.md, S50): (a) metres from the shortest path; (b) nats below the
+entropy of the uniform distribution over the six actions; (c) equal entries at the end of the trail."""
 
 
-def ask_reason(
-    situation: interface.Situation, thought: interface.Thought | None, rules: AskRules = AskRules()
-) -> str | None:
+def ask_reason(situation: interface.Situation, thought: interface.Thought | None) -> str | None:
     """The first rule that says to ask, in the order of docs/sources.md, S50; None if none does.
 
     Args:
@@ -171,14 +161,14 @@ def ask_reason(
     moves = None if thought is None or thought.moves is None else np.asarray(thought.moves, dtype=float)
     if moves is not None and here == goal and _best(moves) == "forward":
         return "arrive"
-    if min(graph.distance[here, v] for v in graph.path(s.trail[0], goal)) > rules.deviate:
+    if min(graph.distance[here, v] for v in graph.path(s.trail[0], goal)) > DEVIATE:
         return "deviate"
     if moves is not None:
         some = moves[moves > 0]
-        if math.log(len(moves)) + float((some * np.log(some)).sum()) < rules.uncertain:
+        if math.log(len(moves)) + float((some * np.log(some)).sum()) < UNCERTAIN:
             return "uncertain"
-    last = s.trail[-rules.unmoved :]
-    if len(last) == rules.unmoved and len(set(last)) == 1:
+    last = s.trail[-UNMOVED:]
+    if len(last) == UNMOVED and len(set(last)) == 1:
         return "unmoved"
     if s.requests_left is not None and s.requests_left >= s.task.horizon - s.time:
         return "remain"
@@ -196,8 +186,8 @@ class VnlaTeacher:
     there (docs/sources.md, S110).
     """
 
-    def __init__(self, moves: MonocularMoves | None = None, rules: AskRules = AskRules()) -> None:
-        self.moves, self.rules = moves or MonocularMoves(), rules
+    def __init__(self, moves: MonocularMoves | None = None) -> None:
+        self.moves = moves or MonocularMoves()
         self._plans: dict[str, MonocularPlan] = {}
 
     def plan(self, world: interface.Place) -> MonocularPlan:
@@ -214,7 +204,7 @@ class VnlaTeacher:
         return self.plan(world).words(pose, goals, most)
 
     def label(self, situation: interface.Situation, thought: interface.Thought | None = None) -> interface.Label:
-        return interface.Label(self.reference(situation), ask_reason(situation, thought, self.rules) is not None)
+        return interface.Label(self.reference(situation), ask_reason(situation, thought) is not None)
 
     def reference(self, situation: interface.Situation) -> interface.Move | interface.Stop:
         """The reference move."""
