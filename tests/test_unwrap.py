@@ -57,7 +57,7 @@ def test_packed_rectangles_do_not_overlap():
 def test_large_houses_are_drawn_coarser_floors_first_mirrors_never():
     def some(name, fineness, side):
         flat = SimpleNamespace(size=np.array([side, side]))
-        return UnwrappedThing(name, "room", "object", flat, (), fineness, False)
+        return UnwrappedThing(name, "room", "object", flat, (), fineness, False, False)
 
     rows = ("floor", 5, 10), ("small floor", 5, 5), ("rug", 4, 10), ("mirror", 8, 4), ("wall", 2, 20)
     things = [some(*row) for row in rows]

@@ -146,8 +146,9 @@ def front(x0: float, x1: float, z0: float, z1: float, y: float, style: str = "fl
     rail = min(0.06, (x1 - x0) * 0.28, (z1 - z0) * 0.3)
     if style != "shaker" or z1 - z0 < 0.13:
         return box([x0, y, z0], [x1, y + thick, z1], 0.0018)
-    panel = box([x0 + rail - 0.002, y + 0.009, z0 + rail - 0.002], [x1 - rail + 0.002, y + thick, z1 - rail + 0.002])
-    return joined(*frame(x0, x1, z0, z1, (y, y + thick), rail, 0.0015), panel)
+    panel = box([x0 + rail - 0.002, y + 0.009, z0 + rail - 0.002], [x1 - rail + 0.002, y + 0.0105, z1 - rail + 0.002])
+    rails = frame(x0, x1, z0, z1, (y, y + 0.01), rail, 0.0015)  # deeper ones are dark where they are inside
+    return joined(*rails, panel, box([x0, y + 0.01, z0], [x1, y + thick, z1]))
 
 
 def joints(fronts: Sequence[Shape]) -> tuple[str, list[Shape]]:
@@ -155,7 +156,7 @@ def joints(fronts: Sequence[Shape]) -> tuple[str, list[Shape]]:
     frames = []
     for shape in fronts:
         (x0, y, z0), (x1, _, z1) = shape.vertices.min(0), shape.vertices.max(0)
-        outer, inner = (outline(x0 + by, x1 - by, z0 + by, z1 - by, y + 0.003) for by in (-0.003, 0.006))
+        outer, inner = (outline(x0 + by, x1 - by, z0 + by, z1 - by, y + 0.003) for by in (-0.002, 0.0018))
         frames.append(between(outer, inner))
     return "gap", frames
 

@@ -38,6 +38,8 @@ class UnwrappedThing:
     """Texels per luxel along each axis."""
     glass: bool
     """Lets light through and is drawn see-through."""
+    person: bool
+    """Is part of a person, whose skin and cloth meet in folds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +75,8 @@ class Atlas:
     rooms: tuple[str, ...]
     """Room of each owner."""
     kinds: tuple[str, ...]
+    people: tuple[bool, ...]
+    """Whether each owner is a person."""
 
 
 def things_of(
@@ -96,20 +100,23 @@ def things_of(
     """
     groups: dict[tuple, list] = {}
     for p in parts:
-        groups.setdefault((p.owner, p.room, p.kind, p.mesh.finish.color[3] < 0.9, p.position, p.yaw), []).append(p)
+        glass, face = p.mesh.finish.color[3] < 0.9, p.mesh_key.startswith("people/") and _is_face(p.mesh.uv)
+        groups.setdefault((p.owner, p.room, p.kind, glass, face, p.position, p.yaw), []).append(p)
     things = []
-    for done, ((owner, room, kind, glass, position, yaw), thing_parts) in enumerate(groups.items()):
+    for done, ((owner, room, kind, glass, face, position, yaw), thing_parts) in enumerate(groups.items()):
         progress(done, len(groups))
         meshes: list[MeshPart] = [p.mesh for p in thing_parts]
+        person = thing_parts[0].mesh_key.startswith("people/")
         if kind in SHELL:
             flat = unwrap_planes(meshes, density)
         else:
-            flat = cached_model(meshes, budget, cache, trusted=kind == "opening", alone=kind == "outdoor")
+            luxels = 2 * budget if person and not face else budget
+            flat = cached_model(meshes, luxels, cache, trusted=kind == "opening", alone=kind == "outdoor")
         if len(flat.corners):
             flat = _placed(flat, position, yaw)
             finishes = tuple(m.finish for m in meshes)
-            fineness = min(finest, _fineness(kind, flat, finishes, density, sharpness))
-            things.append(UnwrappedThing(owner, room, kind, flat, finishes, fineness, glass))
+            fineness = min(finest, _fineness(kind, flat, finishes, density, 3 * sharpness if face else sharpness))
+            things.append(UnwrappedThing(owner, room, kind, flat, finishes, fineness, glass, person))
     return tuple(things)
 
 
@@ -160,7 +167,8 @@ def atlas_of(things: Sequence[UnwrappedThing], widest: int = 4096, most: int = 3
                 )
             pages.append(_page([t for t, ok in zip(shelf, inside) if ok], places[inside], fineness, glass, number))
             shelf = [t for t, ok in zip(shelf, inside) if not ok]
-    return Atlas(tuple(pages), owners, tuple(first[o].room for o in owners), tuple(first[o].kind for o in owners))
+    room, kind, person = (tuple(getattr(first[o], x) for o in owners) for x in ("room", "kind", "person"))
+    return Atlas(tuple(pages), owners, room, kind, person)
 
 
 def _placed(flat: Unwrapped, position: Sequence[float], yaw: float) -> Unwrapped:
@@ -199,6 +207,11 @@ def flat_areas(corners: np.ndarray) -> np.ndarray:
     """(m,) areas of triangles (m, 3, 2)."""
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     return 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def _is_face(uv: np.ndarray) -> bool:
+    """True for a person's skin and eyes, which wear one picture; they have luxels of their own and finer texels."""
+    return bool(uv.min() >= 0.0 and uv.max() <= 1.0)
 
 
 def _is_print(flat: Unwrapped, areas: np.ndarray) -> bool:

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from embodied.house.house import House
+from embodied.light.backend import mi, scene_of, vector
 from embodied.light.pages.atlas import SHELL, Atlas, Page
 from embodied.light.pages.colours import ColourMaps, albedo
 from embodied.light.pages.cover import Sheet, Texels, rasterise, sheets_of
-from embodied.light.pages.unwrap import areas_of
+from embodied.light.pages.unwrap import areas_of, face_normals
 from embodied.light.tracing.emitters import Lamp
-from embodied.light.tracing.radiosity import Points, points_of, woven
+from embodied.light.tracing.radiosity import LIFT, Points, points_of, woven
 
 AMBIENT = np.array([4.5e-4, 5e-4, 6e-4])
 """e that every surface receives besides: starlight and the lamps of the street; no room is ever black."""
+WAYS_AROUND = np.array([np.roll([0.0, a, b * 1.618], k) / 1.902 for k in range(3) for a in (-1, 1) for b in (-1, 1)])
+"""(12, 3) unit: the corners of an icosahedron."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +54,7 @@ class Luxels:
 def luxels_of(atlas: Atlas, maps: ColourMaps) -> Luxels:
     """Surfaces under every luxel; nothing glows yet (`with_glow`)."""
     sheets = sheets_of(atlas.pages)
-    texels = tuple(rasterise(p, 1, s) for p, s in zip(atlas.pages, sheets))
+    texels = _in_the_open(atlas, tuple(rasterise(p, 1, s) for p, s in zip(atlas.pages, sheets)))
     pairs = list(zip(atlas.pages, texels))
     owner = np.concatenate([p.owner[t.face] for p, t in pairs])
     ends = np.cumsum([len(t.index) for t in texels])
@@ -75,6 +78,30 @@ def luxels_of(atlas: Atlas, maps: ColourMaps) -> Luxels:
         np.array([k in SHELL for k in atlas.kinds])[owner],
         sheets,
     )
+
+
+def _in_the_open(atlas: Atlas, texels: tuple[Texels, ...]) -> tuple[Texels, ...]:
+    """Without those in the folds of a person, from which more than a third of the rays meet back faces. What is seen
+    of such a fold takes the light of the luxels around."""
+    people = [np.array(atlas.people)[p.owner] for p in atlas.pages]
+    corners = np.concatenate([p.corners[whose] for p, whose in zip(atlas.pages, people)])
+    if not len(corners):
+        return texels
+    scene, normals, open_ = scene_of(corners), face_normals(corners), []
+    for t, whose in zip(texels, people):
+        mine = np.flatnonzero(whose[t.face])
+        if not len(mine):
+            open_.append(t)
+            continue
+        ways = (t.face_normal[mine, None] + 0.99 * WAYS_AROUND).reshape(-1, 3)
+        start = np.repeat(t.position[mine] + t.face_normal[mine] * LIFT, len(WAYS_AROUND), axis=0)
+        hit = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(vector(start)), vector(ways)), False, True)
+        met, face = np.array(hit.is_valid()), np.array(hit.prim_index)
+        behind = met & ((normals[np.where(met, face, 0)] * ways).sum(1) > 0)
+        keep = np.ones(len(t.index), bool)
+        keep[mine] = behind.reshape(-1, len(WAYS_AROUND)).mean(1) <= 0.35
+        open_.append(replace(t, **{f.name: getattr(t, f.name)[keep] for f in fields(t) if f.name != "shape"}))
+    return tuple(open_)
 
 
 def with_glow(lux: Luxels, house: House, atlas: Atlas, lamps: Sequence[Lamp]) -> Luxels:
