@@ -146,9 +146,9 @@ def front(x0: float, x1: float, z0: float, z1: float, y: float, style: str = "fl
     rail = min(0.06, (x1 - x0) * 0.28, (z1 - z0) * 0.3)
     if style != "shaker" or z1 - z0 < 0.13:
         return box([x0, y, z0], [x1, y + thick, z1], 0.0018)
-    panel = box([x0 + rail - 0.002, y + 0.009, z0 + rail - 0.002], [x1 - rail + 0.002, y + 0.0105, z1 - rail + 0.002])
-    rails = frame(x0, x1, z0, z1, (y, y + 0.01), rail, 0.0015)  # deeper ones are dark where they are inside
-    return joined(*rails, panel, box([x0, y + 0.01, z0], [x1, y + thick, z1]))
+    panel = box([x0 + rail - 0.002, y + 0.009, z0 + rail - 0.002], [x1 - rail + 0.002, y + 0.0118, z1 - rail + 0.002])
+    rails = frame(x0, x1, z0, z1, (y, y + 0.0105), rail, 0.0015)  # whole ones are dark where they are in the panel
+    return joined(*rails, *frame(x0, x1, z0, z1, (y + 0.0105, y + thick), rail), panel)
 
 
 def joints(fronts: Sequence[Shape]) -> tuple[str, list[Shape]]:
