@@ -14,6 +14,7 @@ from conftest import two_rooms
 from hand_light import TINY
 from handmade import box_mesh
 
+from embodied.assets.people import POSES, people, posed
 from embodied.assets.records import Finish
 from embodied.bench.light import psnr, ssim
 from embodied.house.house import House, Light, Room, Sky, Storey
@@ -26,6 +27,7 @@ from embodied.light.pages.atlas import atlas_of, things_of
 from embodied.light.pages.colours import ColourMaps
 from embodied.light.pages.cover import rasterise
 from embodied.light.pages.tone import Exposure, develop
+from embodied.light.pages.unwrap import areas_of
 from embodied.light.tracing import luxels, radiosity
 from embodied.light.tracing.emitters import lamps_of, portals_of
 from embodied.light.tracing.sky import Outdoors, paint, sun_direction, sun_height
@@ -258,3 +260,24 @@ def test_exposure_does_not_hang_on_which_side_of_a_leap_a_percentile_falls() -> 
     assert np.percentile(more, 97) / np.percentile(fewer, 97) > 4
     assert brightest(more).mean() / brightest(fewer).mean() < 1.4
     assert np.allclose(brightest(np.full((100, 3), 0.7)), 0.7)
+
+
+def test_skin_of_people_has_finer_texels_than_cloth_and_what_is_inside_them_no_luxels(tmp_path):
+    anna = people()["anna"]
+    parts = [
+        Part("person_1", "object", "a", mesh, f"people/anna#{i}")
+        for i, mesh in enumerate(posed(anna, POSES["waiting"], 2))
+    ]
+    atlas = atlas_of(things_of(parts, density=20.0, budget=800.0, sharpness=0.45, cache=tmp_path))
+    fine = {}
+    for page in atlas.pages:
+        on_page = areas_of(np.pad(page.luxels * page.fineness, ((0, 0), (0, 0), (0, 1)))).sum()
+        skin = any("anna.jpg" in (f.texture or "") for f in page.finishes)
+        fine[skin] = (on_page / areas_of(page.corners).sum()) ** 0.5
+    assert fine[True] > 180 > 100 > fine[False], "texels per metre"
+    boxes = [box_mesh((x, x, x), (1 - x, 1 - x, 1 + x), (0.5, 0.5, 0.5, 1.0)) for x in (0.0, 0.3)]
+    for key, kept in (("people/anna", False), ("built/boxes", True)):
+        nested = [Part("boxes", "object", "a", mesh, f"{key}#{i}") for i, mesh in enumerate(boxes)]
+        atlas = atlas_of(things_of(nested, density=20.0, budget=800.0, cache=tmp_path))
+        at = np.abs(luxels.luxels_of(atlas, ColourMaps()).position - 0.5)
+        assert (at.max(1) < 0.45).any() == kept and (at[:, 2] > 0.7).any(), key
