@@ -76,7 +76,7 @@ class Atlas:
     """Room of each owner."""
     kinds: tuple[str, ...]
     people: tuple[bool, ...]
-    """Whether each owner is a person."""
+    """True for each owner that is a person."""
 
 
 def things_of(

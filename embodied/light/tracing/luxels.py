@@ -89,17 +89,17 @@ def _in_the_open(atlas: Atlas, texels: tuple[Texels, ...]) -> tuple[Texels, ...]
         return texels
     scene, normals, open_ = scene_of(corners), face_normals(corners), []
     for t, whose in zip(texels, people):
-        mine = np.flatnonzero(whose[t.face])
-        if not len(mine):
+        of_people = np.flatnonzero(whose[t.face])
+        if not len(of_people):
             open_.append(t)
             continue
-        ways = (t.face_normal[mine, None] + 0.99 * WAYS_AROUND).reshape(-1, 3)
-        start = np.repeat(t.position[mine] + t.face_normal[mine] * LIFT, len(WAYS_AROUND), axis=0)
+        ways = (t.face_normal[of_people, None] + 0.99 * WAYS_AROUND).reshape(-1, 3)
+        start = np.repeat(t.position[of_people] + t.face_normal[of_people] * LIFT, len(WAYS_AROUND), axis=0)
         hit = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(vector(start)), vector(ways)), False, True)
         met, face = np.array(hit.is_valid()), np.array(hit.prim_index)
         behind = met & ((normals[np.where(met, face, 0)] * ways).sum(1) > 0)
         keep = np.ones(len(t.index), bool)
-        keep[mine] = behind.reshape(-1, len(WAYS_AROUND)).mean(1) <= 0.35
+        keep[of_people] = behind.reshape(-1, len(WAYS_AROUND)).mean(1) <= 0.35
         open_.append(replace(t, **{f.name: getattr(t, f.name)[keep] for f in fields(t) if f.name != "shape"}))
     return tuple(open_)
 
