@@ -1,4 +1,4 @@
-"""embodied/Robot-v0: a robot of any MJCF in lit houses, that reaches, finds, opens and picks up things.
+"""embodied/Robot-v0: a robot of any MJCF in lit houses, that reaches, finds, opens, picks up and brings things.
 
     env = gymnasium.make("embodied/Robot-v0", task="pick", robot="panda.xml", hand="gripper", data="DIR")
 
@@ -23,9 +23,10 @@ from embodied.gym.drive import VIEW, LiveEnv, chosen_worlds
 from embodied.gym.driving import POINTS, TEXT
 from embodied.gym.sensors import LARGE, PIXELS, check_live, live_pixels, pixel_spaces
 from embodied.gym.spaces import codes_of
+from embodied.kinds.plugins import record_named
 from embodied.navigation.floor_ways import FloorWays
 from embodied.render.camera import camera_of
-from embodied.scene.doors import openness
+from embodied.scene.doors import openness, ways_open
 from embodied.scene.robots import place
 from embodied.seeds import checked_seed
 from embodied.tasks.ask import look_of
@@ -46,7 +47,7 @@ class RobotSettings:
     hand: str = "grip"
     """The robot, as of embodied.place, and its site or body with which it takes hold."""
     task: str = "pick"
-    """One of ROBOT_TASKS."""
+    """A registered RobotTask: 'reach', 'find', 'open', 'pick', 'bring', or 'module:NAME' of your own."""
     actions: str = "base"
     """'base' or 'actuators'."""
     grasp: str = "assisted"
@@ -61,7 +62,8 @@ class RobotSettings:
 
     def __post_init__(self) -> None:
         check_live(self.observations, PIXELS, *self.size)
-        known = {"task": (*ROBOT_TASKS,), "actions": ("base", "actuators"), "grasp": ("contact", "assisted")}
+        robot_task(self.task)
+        known = {"actions": ("base", "actuators"), "grasp": ("contact", "assisted")}
         for name, values in known.items():
             if getattr(self, name) not in values:
                 raise ValueError(f"{name} is {getattr(self, name)!r}; use one of {values}")
@@ -78,6 +80,35 @@ class RobotGoal:
     """(n,) of the floor, near it."""
 
 
+@dataclass(frozen=True)
+class RobotTask:
+    """A task of Robot-v0; yours is registered with `register_robot_task` under the name 'module:NAME'."""
+
+    name: str
+    words: str
+    """Of a request; {} is the thing."""
+    goals: Callable[[Any, np.random.Generator], RobotGoal | None]
+    """(env, rng) -> a goal; None where the one that was drawn cannot be had."""
+    succeeded: Callable[[Any], bool]
+    """Of the env."""
+    env: Callable[..., RobotEnv] | None = None
+    """What plays it; RobotEnv where not given."""
+
+
+ROBOT_TASKS: dict[str, RobotTask] = {}
+
+
+def register_robot_task(task: RobotTask) -> RobotTask:
+    """Make a task known by its name; returns it. Call it where the task is defined."""
+    ROBOT_TASKS[task.name] = task
+    return task
+
+
+def robot_task(name: str) -> RobotTask:
+    """The task of a name; raises ValueError where there is none."""
+    return record_named(name, ROBOT_TASKS, RobotTask, "embodied.gym", ("bring",))
+
+
 class RobotEnv(LiveEnv):
     """Errands of a robot as a Gymnasium environment.
 
@@ -85,37 +116,39 @@ class RobotEnv(LiveEnv):
     touched), force (the largest, N), fallen (things), openness, grasp, held.
     """
 
+    spoken: tuple[str, ...] = ()
+    """Names of further numbers of an action, for subclasses."""
+    text = TEXT
+    """Characters of an instruction."""
+
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
 
     def __init__(self, worlds: Mapping[str, World], settings: RobotSettings, render_mode: str | None = None) -> None:
         super().__init__(render_mode)
-        self.worlds, self.settings = dict(worlds), settings
-        self._bodies: dict[str, tuple[RobotBody, FloorWays]] = {}
+        self.worlds, self.settings, self.task = dict(worlds), settings, robot_task(settings.task)
+        self._bodies: dict[str, tuple[RobotBody, FloorWays, Any]] = {}
         self._enter(min(self.worlds))
         body, model = self.body, self.body.model
         limits, limited = model.actuator_ctrlrange[body.arm], model.actuator_ctrllimited[body.arm].astype(bool)
         self.middle, self.half = np.where(limited, limits.mean(1), 0.0), np.where(limited, np.ptp(limits, 1) / 2, 1.0)
         rolling = ("ahead", "left", "turn") if settings.actions == "base" else ()
         hand = ("hold",) if settings.grasp == "assisted" else ()
-        self.commands = (*rolling, *(model.actuator(k).name for k in body.arm), *hand)  # an action's numbers
+        arm = (model.actuator(k).name for k in body.arm)
+        self.commands = (*rolling, *arm, *hand, *self.spoken)  # an action's numbers
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.commands),), np.float32)
         pixels = pixel_spaces(settings.size, settings.observations)
         seen: dict[str, spaces.Box] = {f"{c}_{name}": space for c in settings.cameras for name, space in pixels.items()}
         seen["proprio"] = spaces.Box(-LARGE, LARGE, (len(body.feels),), np.float32)
-        self.observation_space = spaces.Dict({**seen, "instruction": spaces.Box(0, 255, (TEXT,), np.uint8)})
+        self.observation_space = spaces.Dict({**seen, "instruction": spaces.Box(0, 255, (self.text,), np.uint8)})
 
     def _enter(self, name: str) -> None:
         self.world, s = self.worlds[name], self.settings
         if name not in self._bodies:
             spec = scene_spec(self.world, None)
-            self._furnish(spec)
             placed = place(spec, s.robot, rolling=s.actions == "base")
             body = RobotBody(self.world.house, spec, placed, hand=s.hand, assisted=s.grasp == "assisted")
-            self._bodies[name] = body, FloorWays(self.world.house, stairs=False)
-        self.body, self.ground = self._bodies[name]
-
-    def _furnish(self, spec: mujoco.MjSpec) -> None:
-        """Add to a house, for subclasses."""
+            self._bodies[name] = body, FloorWays(self.world.house, stairs=False), ways_open(body.model)
+        self.body, self.ground, self._ways_open = self._bodies[name]
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -140,7 +173,7 @@ class RobotEnv(LiveEnv):
         """Draw the goal; returns the cell at which the robot starts."""
         for _ in range(POINTS):
             start = int(rng.choice(np.flatnonzero(self.ground.room_of_cell != "")))
-            goal = ROBOT_TASKS[self.settings.task][1](self, rng)
+            goal = self.task.goals(self, rng)
             if goal is not None and len(goal.cells):
                 self.goal, self.shortest = goal, max(float(self.ground.ways(goal.cells).metres[start]), 1e-9)
                 return start
@@ -152,17 +185,21 @@ class RobotEnv(LiveEnv):
             raise ValueError(f"an action should be {len(self.commands)} finite numbers from -1 to 1, got {action!r}")
         if self.ended:
             raise RuntimeError("the episode is over; reset before another step")
-        a = np.clip(a, -1.0, 1.0)
-        if self.settings.actions == "base":
-            body.rolling, a = a[:3] * FASTEST_BASE, a[3:]
-        body.data.ctrl[body.arm] = self.middle + self.half * a[: len(body.arm)]
-        body.step(CONTROL, holding=body.assisted and a[-1] > 0.5)
+        named = dict(zip(self.commands, np.clip(a, -1.0, 1.0), strict=True))
+        price, rolls = self._spoke(named), 3 * (self.settings.actions == "base")
+        body.rolling = np.array([*named.values()][:rolls] or [0.0] * 3) * FASTEST_BASE
+        body.data.ctrl[body.arm] = self.middle + self.half * [*named.values()][rolls : rolls + len(body.arm)]
+        body.step(CONTROL, holding=named.get("hold", 0.0) > 0.5)
         self.time += CONTROL
         self._fallen |= {i for i, z in self.heights.items() if i != body.held and body.thing(i)[2] < z - FALLS}
-        self.succeeded = ROBOT_TASKS[self.settings.task][2](self)
+        self.succeeded = self.task.succeeded(self)
         late = self.time >= self.settings.seconds - 1e-9 and not self.succeeded
         self.ended = self.succeeded or late
-        return self._look(), float(self.succeeded) - 0.001, self.succeeded, late, self._facts()
+        return self._look(), float(self.succeeded) - 0.001 - price, self.succeeded, late, self._facts()
+
+    def _spoke(self, named: Mapping[str, float]) -> float:
+        """What the numbers of `spoken` do, before the rest of an action; returns the price."""
+        return 0.0
 
     def _facts(self) -> dict[str, Any]:
         body, success = self.body, float(self.succeeded)
@@ -179,7 +216,7 @@ class RobotEnv(LiveEnv):
     @property
     def openness(self) -> dict[str, float]:
         """How far doors and furniture are open, 0 to 1, as World.openable names them."""
-        return openness(self.body.model, self.body.data)
+        return openness(self.body.model, self.body.data, self._ways_open)
 
     def _look(self) -> dict[str, Any]:
         s, seen = self.settings, dict[str, Any]()
@@ -188,7 +225,12 @@ class RobotEnv(LiveEnv):
         for name in s.cameras if s.observations else ():
             camera = camera_of(self.body.model, self.body.data, f"robot/{name}")
             seen |= {f"{name}_{k}": v for k, v in live_pixels(self.world, camera, s.size, s.observations).items()}
-        return {**seen, "proprio": self.body.proprioception(), "instruction": codes_of(self.goal.request, TEXT).copy()}
+        return {**seen, "proprio": self.body.proprioception(), "instruction": codes_of(self.heard, self.text).copy()}
+
+    @property
+    def heard(self) -> str:
+        """The request, for subclasses with what was said since."""
+        return self.goal.request
 
     def _picture(self) -> np.ndarray:
         camera = camera_of(self.body.model, self.body.data, f"robot/{self.settings.cameras[0]}")
@@ -210,7 +252,7 @@ def some_thing(env: RobotEnv, rng: np.random.Generator) -> RobotGoal | None:
     if not names or (p := of[names[int(rng.integers(len(names)))]]).position[2] > HIGHEST:
         return None
     name = " ".join([*look_of(env.world.catalogue)(p)[:1], p.object_class])
-    request = ROBOT_TASKS[env.settings.task][0].format(name)[:TEXT]
+    request = env.task.words.format(name)[:TEXT]
     return RobotGoal(request, p.id, "", env.cells_near(p.position, p.room))
 
 
@@ -236,17 +278,17 @@ def picked(env: RobotEnv) -> bool:
     return bool(env.body.thing(name)[2] > env.heights[name] + RAISED) and name in (env.body.held, *env.body.met)
 
 
-ROBOT_TASKS: dict[str, tuple[str, Callable[..., RobotGoal | None], Callable[[RobotEnv], bool]]] = {
-    "reach": ("touch the {}", some_thing, lambda env: env.goal.thing in (env.body.held, *env.body.met)),
-    "find": ("go to the {}", some_thing, lambda env: env.ground.cell_at(env.body.position) in env.goal.cells),
-    "open": ("open the {}", some_part, lambda env: env.openness[env.goal.part] >= OPENED),
-    "pick": ("pick up the {}", some_thing, picked),
-}
-"""By name: words of a request; (env, rng) -> goal, None where the one that was drawn cannot be had; and success. Add
-your own (examples/bring_me.py)."""
+for _task in (
+    RobotTask("reach", "touch the {}", some_thing, lambda env: env.goal.thing in (env.body.held, *env.body.met)),
+    RobotTask("find", "go to the {}", some_thing, lambda env: env.ground.cell_at(env.body.position) in env.goal.cells),
+    RobotTask("open", "open the {}", some_part, lambda env: env.openness[env.goal.part] >= OPENED),
+    RobotTask("pick", "pick up the {}", some_thing, picked),
+):
+    register_robot_task(_task)
 
 
 def make(*, render_mode: str | None = None, **options: Any) -> RobotEnv:
     """The environment; options as of `chosen_worlds`, and fields of RobotSettings."""
-    worlds, settings = chosen_worlds(**options)
-    return RobotEnv(worlds, RobotSettings(**settings), render_mode)
+    worlds, others = chosen_worlds(**options)
+    settings = RobotSettings(**others)
+    return (robot_task(settings.task).env or RobotEnv)(worlds, settings, render_mode)

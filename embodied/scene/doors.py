@@ -96,20 +96,30 @@ def is_of_house(model: mujoco.MjModel, body: int, house: House) -> bool:
     return root in house.placement_by_id or (stem in names and root != stem)
 
 
-def openness(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, float]:
-    """How far all that turns or slides is open, 0 to 1: by opening, of a pair the wider leaf, and of furniture by
-    placement id and part."""
-    out: dict[str, float] = {}
+def ways_open(model: mujoco.MjModel) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """All that turns or slides: names as of `openness`, addresses in qpos, and its value when it is open."""
+    names, adr, reach = list[str](), [], []
     for j in range(model.njnt):
-        body, value = model.joint(j).bodyid[0], data.qpos[model.jnt_qposadr[j]]
-        stem, hinge, _ = model.joint(j).name.partition("doorhinge")
+        body, (stem, hinge, _) = model.jnt_bodyid[j], model.joint(j).name.partition("doorhinge")
         root = model.body(model.body_rootid[body]).name
-        if model.nuser_jnt and (reach := model.jnt_user[j, 0]) > 0:
+        of_part = float(model.jnt_user[j, 0]) if model.nuser_jnt else 0.0
+        if of_part > 0 or hinge:
             part = model.body(body).name.removeprefix(f"{root}_")
-            out[f"{root}/{part}"] = float(np.clip(value / reach, 0, 1))
-        elif hinge:
-            opening = stem.rpartition("_")[0]
-            out[opening] = max(out.get(opening, 0.0), float(np.clip(value / WIDEST, 0, 1)))
+            names.append(f"{root}/{part}" if of_part > 0 else stem.rpartition("_")[0])
+            adr.append(model.jnt_qposadr[j])
+            reach.append(of_part if of_part > 0 else WIDEST)
+    return names, np.array(adr, int), np.array(reach)
+
+
+def openness(
+    model: mujoco.MjModel, data: mujoco.MjData, ways: tuple[list[str], np.ndarray, np.ndarray] | None = None
+) -> dict[str, float]:
+    """How far all that turns or slides is open, 0 to 1: by opening, of a pair the wider leaf, and of furniture by
+    placement id and part; `ways` of the model, where they are known."""
+    out: dict[str, float] = {}
+    names, adr, reach = ways or ways_open(model)
+    for name, x in zip(names, np.clip(data.qpos[adr] / reach, 0, 1).tolist(), strict=True):
+        out[name] = max(out.get(name, 0.0), x)
     return out
 
 
