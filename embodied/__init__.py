@@ -21,6 +21,7 @@ Pictures
     Day, day_of                    who is where in a house at which hour, and the walks between
 Tasks
     make_env                       a Gymnasium environment, as gymnasium.make("embodied/HANNA-v0")
+    dm_env                         Robot-v0 or another one as a dm_env.Environment
     Task, Observation, Move, Ask, Stop, Intention, Situation, Reply, Subtask, Episode
 Data sets
     DatasetConfig, build_dataset, draw_panoramas, Dataset
@@ -31,8 +32,8 @@ Other
     stream                         named random generators of one seed
 
 Each name is imported when it is first used; `help(embodied.open_world)` shows an example. Environments:
-embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0, Ask-v0, Doors-v0, VLNCE-v0, ObjectNav-v0 and Drive-v0, registered
-by `import embodied`.
+embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0, Ask-v0, Doors-v0, VLNCE-v0, ObjectNav-v0, Drive-v0 and
+Robot-v0, registered by `import embodied`.
 """
 
 from __future__ import annotations
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from embodied.evaluation.tables import markdown
     from embodied.generate import HouseConfig, generate_house
     from embodied.generate.plan_file import house_of_plan, load_plan
+    from embodied.gym.dm import make as dm_env
     from embodied.gym.env import make as make_env
     from embodied.gym.sensors import ViewSettings
     from embodied.house.house import House

@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
+import json
 import math
+import sys
 import tempfile
 from pathlib import Path
 
+import mujoco
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from absl.testing import absltest
 from conftest import two_rooms
-from dm_env import test_utils
+from dm_env import specs, test_utils
 from gymnasium.utils.env_checker import check_env
+from hand_chat import ChatServer, said
 from handmade import HandCatalogue, furnished
 
+import embodied
+from embodied.agents.language_models.agent import LanguageModelAgent
+from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
+from embodied.gym.bring import BringEnv
 from embodied.gym.robot import RobotEnv, RobotSettings, make
+from embodied.gym.skills import Skills
+from embodied.interface import Ask, Intention, Move
 from embodied.world import open_world
 
 pytestmark = pytest.mark.gl
@@ -26,7 +38,7 @@ def example(name):
     spec = importlib.util.spec_from_file_location(
         name.removesuffix(".py"), Path(__file__).parents[1] / "examples" / name
     )
-    module = importlib.util.module_from_spec(spec)
+    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
@@ -78,18 +90,81 @@ def test_a_closed_hand_holds_a_thing_where_grasps_are_assisted_alone(world, gras
         assert body.held is None and body.thing("mug_1")[2] < mug[2] + 0.02, "let go, it falls"
 
 
-def test_who_knows_where_it_is_brings_it_and_who_does_not_may_ask(world):
+@pytest.fixture(scope="module")
+def skills(world):
+    return Skills(BringEnv({world.name: world}, RobotSettings(**{**SMALL, "task": "bring"})))
+
+
+def test_who_knows_where_it_is_brings_it_and_others_find_it(skills):
     bring = example("bring_me.py")
-    env = bring.BringEnv({world.name: world}, RobotSettings(**SMALL, task="bring"))
-    skills = bring.Skills(env)
     for seed in range(3):
-        assert skills.reset(seed) == "bring me the wood mug"
-        bring.expert(skills, np.random.default_rng(0))
-        assert skills.info["success"] == 1.0 and 0 < skills.info["spl"] <= 1, (seed, skills.info)
-    skills.reset(3)
-    assert skills.do("ask region") == "It is in living_room_1." and skills.do("ask route") == "It is on table_1."
-    assert math.isclose(env.price, 0.25) and skills.do("fly") == "say go, open, take, give or ask"
-    assert skills.do("take moon_1") == "nothing is called moon_1" and skills.do("open door_1").startswith("nothing")
+        for name in ("expert", "always asks"):
+            facts = bring.episode(skills, bring.PLAYERS[name], seed)
+            assert facts["success"] == 1 and 0 < facts["spl"] <= 1, (seed, name, facts)
+        assert facts["asked"]["region"] == 2 and facts["asked"]["confirm"] == 1
+        assert math.isclose(facts["price"], 0.05 * (sum(facts["asked"].values()) - 1) + 0.2), "a route costs more"
+    assert bring.episode(skills, bring.Searcher(sees=False), 0)["success"] <= 1
+
+
+def test_answers_are_about_the_thing_then_about_the_person_and_cost_reward(skills):
+    o = skills.reset(3)
+    assert o.instruction == "bring me the wood mug" and Intention.CONFIRM not in o.can_ask
+    env, hold = skills.env, np.zeros(skills.env.action_space.shape)
+    hold[env.commands.index("ask region")] = 1.0
+    rewards = [env.step(hold)[1] for _ in range(2)]
+    assert rewards == pytest.approx([-0.051, -0.001]), "holding the question asks once"
+    assert skills.step(Ask(Intention.REGION)).instruction.endswith("It is in the living room.")
+    assert skills.do("take mug_1") == "you hold mug_1"
+    o = skills.step(Ask(Intention.CONFIRM))
+    assert o.instruction.endswith("Yes, it is this one.") and o.extras.holds == "mug_1"
+    room = env.world.house.room_by_id[env.room_at(env.person)].kind.replace("_", " ")
+    assert skills.step(Ask(Intention.REGION)).instruction.endswith(f"I am in the {room}.")
+    assert "leave" in o.candidates.words and not any(w.startswith("take") for w in o.candidates.words)
+    assert skills.step(Move(skills.words.index("leave"))).extras.holds == ""
+
+
+def test_a_language_model_plays_by_skills_and_its_answers_play_again(skills, tmp_path):
+    def speaks(request):
+        schema = request["response_format"]["json_schema"]["schema"]
+        can, text = schema["properties"]["action"]["enum"], json.dumps(request["messages"])
+        told = [w for w in can if w.startswith("go ") and f"in the {w[3:-2].replace('_', ' ')}." in text]
+        wants = ["give", "take mug_1", *["ask region"] * (" . " not in text or "you hold mug_1" in text), *told]
+        return said(json.dumps({"reason": "", "action": next((w for w in wants if w in can), can[0])}))
+
+    episode, cache = example("bring_me.py").episode, AnswerCache(tmp_path / "answers.sqlite")
+    with ChatServer(speaks) as server:
+        client = Client(ServerSettings("scripted", server.url), cache)
+        facts = episode(skills, LanguageModelAgent(client), 1)
+        assert facts["success"] == 1 and facts["asked"] and client.sent > 1
+        shown = server.requests[0]["messages"][1]["content"]
+    assert "bring me the wood mug" in shown and "you are in" in shown
+    offline = Client(dataclasses.replace(client.settings, base_url="http://127.0.0.1:9/v1"), cache)
+    assert episode(skills, LanguageModelAgent(offline), 1) == facts and offline.sent == 0
+
+
+def test_episodes_become_lerobot_data_with_what_was_said(world, tmp_path):
+    bring = example("bring_me.py")
+    settings = RobotSettings(task="bring", size=(32, 32), observations=("rgb",))
+    env = BringEnv({world.name: world}, settings)
+    steps = bring.record(env, tmp_path / "out", range(2), bring.Searcher(Intention.REGION))
+    table = pq.read_table(tmp_path / "out/data/chunk-000/file-000.parquet").to_pydict()
+    info = json.loads((tmp_path / "out/meta/info.json").read_text())
+    assert len(table["index"]) == steps and info["fps"] == 10 and table["next.success"].count(True) == 2
+    assert tuple(info["features"]["action"]["names"]) == env.commands
+    asks = np.array(table["action"])[:, env.commands.index("ask region")]
+    heard = [bool(events) for events in table["language_events"]]
+    assert heard == (asks == 1).tolist() and 2 <= sum(heard) <= 4
+
+
+def test_an_arm_of_dm_control_on_a_cart_finds_things(world):
+    from dm_control.third_party import kinova
+
+    others = example("other_robots.py")
+    arm = others.on_a_cart(mujoco.MjSpec.from_file(f"{kinova.__path__[0]}/jaco_arm.xml"))
+    env = RobotEnv({world.name: world}, RobotSettings(robot=arm, hand="arm_wristsite", task="find", **SMALL))
+    assert env.commands[:3] == ("ahead", "left", "turn") and "robot/arm_joint_1 rad" in " ".join(env.body.feels)
+    for seed in range(2):
+        assert others.drive(env, seed)["success"] == 1.0
 
 
 def test_wishes_of_robots_that_cannot_be_had_are_refused(world):
@@ -113,12 +188,24 @@ def test_wishes_of_robots_that_cannot_be_had_are_refused(world):
 
 
 class TestDmEnv(test_utils.EnvironmentTestMixin, absltest.TestCase):
-    """dm_env's own tests of the environment that examples/as_dm_env.py makes of it."""
+    """dm_env's own tests of what embodied.dm_env makes."""
 
     def make_object_under_test(self):
         world = open_world(furnished(two_rooms()), HandCatalogue(), Path(tempfile.mkdtemp()), size=32)
-        return example("as_dm_env.py").DmEnv(RobotEnv({world.name: world}, RobotSettings(**SMALL, seconds=0.5)))
+        return embodied.dm_env(worlds={world.name: world}, task="bring", seconds=0.5, **SMALL)
 
     def make_action_sequence(self):
         spec = self.environment.action_spec()
         return [np.full(spec.shape, 0.1, spec.dtype)] * 8
+
+
+def test_specs_say_what_spaces_say_and_others_are_refused():
+    from gymnasium import spaces
+
+    from embodied.gym.dm import spec_of
+
+    spec = spec_of(spaces.Dict({"a": spaces.Discrete(3), "b": spaces.Box(-1, 2, (2,), np.float32)}), "x")
+    assert isinstance(spec["a"], specs.DiscreteArray) and spec["a"].num_values == 3
+    assert spec["b"].maximum.tolist() == [2, 2] and spec["b"].dtype == np.float32
+    with pytest.raises(ValueError, match="no spec for Text"):
+        spec_of(spaces.Text(3), "words")

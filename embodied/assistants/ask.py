@@ -52,7 +52,7 @@ class AskAssistant:
 
     def intentions(self, situation: Situation) -> tuple[Intention, ...]:
         """Confirm at a thing of the class, disambiguate where several are seen that may be it, all others always."""
-        seen = in_view(situation.world, situation.pose.node, _goal(situation))
+        seen = in_view(situation.world, situation.pose.node, described_goal(situation))
         possible = [name for name, _, _ in seen if name in situation.extras.possible]
         cannot = set()
         if not seen or seen[0][2] > CONFIRM_DISTANCE:
@@ -69,7 +69,7 @@ class AskAssistant:
                 return Reply(text=UNKNOWN, intention=question)
         else:
             meant = question
-        goal, subtask = _goal(situation), None
+        goal, subtask = described_goal(situation), None
         if meant is Intention.CONFIRM:
             this = in_view(situation.world, situation.pose.node, goal)[0][0]
             yes = this == goal.placement
@@ -95,7 +95,7 @@ class AskAssistant:
         return tuple(self.answer(situation, q, rng=rng).text or "" for q in intentions)
 
     def _appearance(self, s: Situation) -> tuple[str, set[str]]:
-        goal, of = _goal(s), s.world.house.placement_by_id
+        goal, of = described_goal(s), s.world.house.placement_by_id
         thing, appearance = of[goal.placement], self._look(of[goal.placement])
         width = f"about {max(thing.size[0], 0.05):.1f} m wide"
         text = f"It is {', '.join([*appearance, width])}{_beside(s.world, thing)}."
@@ -112,14 +112,14 @@ class AskAssistant:
         return text + ("" if nodes == whole else " From there it is further."), subtask
 
 
-def _goal(s: Situation) -> FindDescribed:
+def described_goal(s: Situation) -> FindDescribed:
     if not isinstance(s.task.goal, FindDescribed):
         raise TypeError(f"this assistant answers in Ask-v0 only, {s.task.id!r} is of kind {s.task.kind!r}")
     return s.task.goal
 
 
 def _region(s: Situation) -> tuple[str, set[str]]:
-    goal, house = _goal(s), s.world.house
+    goal, house = described_goal(s), s.world.house
     room_of = {p: house.room_by_id[house.placement_by_id[p].room] for p in (*goal.fitting, *goal.similar)}
     room = room_of[goal.placement]
     same, kind = [r.id for r in house.rooms if (r.kind, r.storey) == (room.kind, room.storey)], room.kind
@@ -130,7 +130,7 @@ def _region(s: Situation) -> tuple[str, set[str]]:
 
 
 def _which(s: Situation) -> tuple[str, set[str]]:
-    goal = _goal(s)
+    goal = described_goal(s)
     seen = {name: (yaw, d) for name, yaw, d in in_view(s.world, s.pose.node, goal)}
     if goal.placement not in seen:
         return "None of those that you see.", {*goal.fitting, *goal.similar} - set(seen)

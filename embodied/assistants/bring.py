@@ -7,17 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from embodied.assistants.ask import AskAssistant
-from embodied.envs.ask import AskTruth
+from embodied.assistants.ask import AskAssistant, described_goal
 from embodied.interface import Intention, Reply, Situation
 
 BRING_QUESTIONS = (Intention.REGION, Intention.APPEARANCE, Intention.ROUTE, Intention.CONFIRM)
 
 
 @dataclass(frozen=True)
-class BringTruth(AskTruth):
+class BringTruth:
     """Knowledge of the person besides the situation."""
 
+    possible: tuple[str, ...]
+    """Placements that the request fits."""
     held: str
     """The thing that the robot holds; '' for none."""
     inside: str
@@ -34,9 +35,9 @@ class Requester(AskAssistant):
         return BRING_QUESTIONS if situation.extras.held else BRING_QUESTIONS[:-1]
 
     def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
-        truth = situation.extras
+        truth: BringTruth = situation.extras
         if question is Intention.CONFIRM:
-            yes = truth.held == situation.task.goal.placement
+            yes = truth.held == described_goal(situation).placement
             text = "Yes, it is this one." if yes else "No, it is not this one."
             return Reply(text=text, intention=question, ruled_out=() if yes else (truth.held,))
         if question is Intention.REGION and truth.held:

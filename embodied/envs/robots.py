@@ -35,7 +35,8 @@ class RobotBody:
         bodies, sites = ({of(k).name: k for k in range(n)} for n, of in ((m.nbody, m.body), (m.nsite, m.site)))
         self.root = min(b for name, b in bodies.items() if name.startswith(start))  # its base
         if start + hand not in {*bodies, *sites}:
-            raise ValueError(f"the robot has no site or body {hand!r} for a hand")
+            known = sorted(n.removeprefix(start) for n in {*bodies, *sites} if n.startswith(start))
+            raise ValueError(f"the robot has no site or body {hand!r} for a hand; it has {known}")
         self._hand = self.data.site(start + hand).xpos if start + hand in sites else self.data.body(start + hand).xpos
         rolls = f"{start}rolling" in bodies
         self._base = [m.joint(start + k).qposadr[0] for k in ROLLING] if rolls else []

@@ -26,7 +26,7 @@ from embodied.gym.spaces import codes_of
 from embodied.kinds.plugins import record_named
 from embodied.navigation.floor_ways import FloorWays
 from embodied.render.camera import camera_of
-from embodied.scene.doors import openness, ways_open
+from embodied.scene.doors import openness
 from embodied.scene.robots import place
 from embodied.seeds import checked_seed
 from embodied.tasks.ask import look_of
@@ -126,7 +126,7 @@ class RobotEnv(LiveEnv):
     def __init__(self, worlds: Mapping[str, World], settings: RobotSettings, render_mode: str | None = None) -> None:
         super().__init__(render_mode)
         self.worlds, self.settings, self.task = dict(worlds), settings, robot_task(settings.task)
-        self._bodies: dict[str, tuple[RobotBody, FloorWays, Any]] = {}
+        self._bodies: dict[str, tuple[RobotBody, FloorWays]] = {}
         self._enter(min(self.worlds))
         body, model = self.body, self.body.model
         limits, limited = model.actuator_ctrlrange[body.arm], model.actuator_ctrllimited[body.arm].astype(bool)
@@ -147,8 +147,8 @@ class RobotEnv(LiveEnv):
             spec = scene_spec(self.world, None)
             placed = place(spec, s.robot, rolling=s.actions == "base")
             body = RobotBody(self.world.house, spec, placed, hand=s.hand, assisted=s.grasp == "assisted")
-            self._bodies[name] = body, FloorWays(self.world.house, stairs=False), ways_open(body.model)
-        self.body, self.ground, self._ways_open = self._bodies[name]
+            self._bodies[name] = body, FloorWays(self.world.house, stairs=False)
+        self.body, self.ground = self._bodies[name]
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -216,7 +216,7 @@ class RobotEnv(LiveEnv):
     @property
     def openness(self) -> dict[str, float]:
         """How far doors and furniture are open, 0 to 1, as World.openable names them."""
-        return openness(self.body.model, self.body.data, self._ways_open)
+        return openness(self.body.model, self.body.data)
 
     def _look(self) -> dict[str, Any]:
         s, seen = self.settings, dict[str, Any]()

@@ -1,47 +1,44 @@
-"""Skills: a robot of Robot-v0 that is told to go, open, take, give, leave and ask, as an agent of interface.py is told.
+"""Skills: a robot of Robot-v0's 'bring' is told to go, open, take, give, leave and ask, as any agent is.
 
-    skills = Skills(BringEnv(worlds, RobotSettings(task="bring", observations=())))
+    skills = Skills(gymnasium.make("embodied/Robot-v0", task="bring", observations=()).unwrapped)
     observation = skills.reset(0)
     observation = skills.step(Move(observation.candidates.words.index("go kitchen_1")))
 
-Candidates are words, so any `Policy` that reads words plays it, a language model, too. Hands are assisted; the arm is a
-lift and a telescope, as FETCHER's.
+Candidates are words, so any `Policy` that reads words plays it, a language model, too. The robot is FETCHER, whose arm
+is a lift and a telescope, and grasps are assisted.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from embodied import interface
+from embodied.assistants.bring import BRING_QUESTIONS
 from embodied.assistants.descriptions import side
 from embodied.geometry import wrap
 from embodied.gym.bring import BringEnv, inside
-from embodied.gym.robot import CONTROL
-from embodied.interface import (
-    STEP, TURNS, Action, Ask, Candidates, Extras, Mode, Move, Observation, Policy, Sight,
-)  # fmt: skip
-from embodied.seeds import stream
+from embodied.gym.robot import OPENED
 from embodied.tasks.ask import look_of
 
-ARM, SEES = 0.25, 4.0
-"""Metres from the base's middle to the hand when the arm is drawn in, and within which a thing is seen, in the line of
-sight of the head."""
+ARM, SEES, REACHED_IN = 0.25, 4.0, 1.5
+"""Metres from the base's middle to the hand when the arm is drawn in, within which a thing in the line of sight of the
+head is seen, and what lies in open furniture."""
 
 
 @dataclass(frozen=True)
-class SkillExtras(Extras):
+class SkillExtras(interface.Extras):
     """Observation of the robot besides what all kinds see."""
 
     sees: Mapping[str, str]
-    """Things in sight, by what skills call them: class and colour, metres, direction; 'person' for whoever asked."""
+    """Things in sight by name, the nearest first: class and colour, metres, direction; 'person' is who asked."""
     holds: str
     room: str
-    """Where it is."""
     outcome: str
     """What came of the last skill."""
 
@@ -53,262 +50,238 @@ class SkillExtras(Extras):
 class Skills:
     """Owns an episode of 'bring' by skills."""
 
-    def __init__(self, env: BringEnv, watch: Callable[[np.ndarray], None] = lambda action: None) -> None:
-        """`watch`: told every action of the environment before it is taken."""
+    def __init__(self, env: BringEnv, watch: Callable[[dict[str, Any], np.ndarray], None] = lambda o, a: None) -> None:
+        """`watch`: told the environment's observation and the action before it is taken."""
         self.env, self._watch = env, watch
 
-    def reset(self, seed: int, world: str | None = None) -> Observation:
-        _, self.info = self.env.reset(seed=seed, options={"world": world} if world else None)
-        self.hold, self.over, self.time, self.arm = False, False, 0, np.zeros(len(self.env.body.arm))
+    def reset(self, seed: int) -> interface.Observation:
+        self._seen, self.info = self.env.reset(seed=seed)
+        self._hold, self.over, self.time, self._set = False, False, 0, np.zeros(len(self.env.body.arm))
         self._look_of, self._been = look_of(self.env.world.catalogue), dict[str, list[int]]()
         self._arm(0.9, 0.0)
-        return self.look("")
+        return self.look("you begin")
 
-    def step(self, action: Action) -> Observation | None:
+    def step(self, action: interface.Action) -> interface.Observation | None:
         """Carry out a candidate or a question, or stop; None when the episode is over."""
-        self.time += 1
-        if isinstance(action, Ask):
-            self._step(ask=f"ask {action.intention.value}")
-            return None if self.over else self.look(str(self.env.replies[-1].text))
-        if not isinstance(action, Move):
+        self.time, outcome = self.time + 1, "you asked"
+        if isinstance(action, interface.Ask):
+            self._act(ask=action.intention.value)
+        elif isinstance(action, interface.Move):
+            outcome = self.do(self.words[action.candidate])
+        else:
             self.over = True
-        return None if self.over else self.look(self.do(self.words[action.candidate]))  # type: ignore[union-attr]
+        return None if self.over else self.look(outcome)
 
     def do(self, words: str) -> str:
         """Carry out 'go ROOM', 'open PART', 'take THING', 'give' or 'leave'; returns what came of it."""
         verb, _, what = words.partition(" ")
-        return str({"go": self.go, "open": self.open, "take": self.take, "give": self.give, "leave": self.leave}[verb](
-            *[what] if what else []
-        ))  # fmt: skip
+        skill = {"go": self.go, "open": self.open, "take": self.take, "give": self.give, "leave": self.leave}[verb]
+        return skill(what)
 
-    def look(self, outcome: str) -> Observation | None:
-        """What is known now; None when the episode is over."""
-        env, body = self.env, self.env.body
-        if self.over:
-            return None
-        seen, held = self.in_sight(), body.held if body.held in body.things else ""
-        rooms = sorted({r for r in env.ground.room_of_cell if r})
-        closed = [n for n in seen if "/" in n]
-        takes = [f"take {n}" for n in seen if n in body.things and n != held]
-        gives = ["give"] * ("person" in seen) + ["leave"]
-        self.words = (*(f"go {r}" for r in rooms), *(gives if held else [*takes, *(f"open {p}" for p in closed)]))
-        n = len(self.words)
-        return Observation(
-            sight=Sight(env.world.name, 0),
-            turn=round(body.yaw / STEP) % TURNS,
-            tilt=0,
-            candidates=Candidates(*np.zeros((2, n), np.float32), np.zeros(n, np.int64), np.ones(n, bool), self.words),
-            instruction=env.heard,
-            target=None,
-            mode=Mode.MAIN,
-            can_ask=env.can_ask,
-            requests_left=None,
-            time=self.time,
-            time_on_task=self.time,
-            extras=SkillExtras(seen, str(held), env.room_at(body.position), outcome),
-        )
+    def look(self, outcome: str) -> interface.Observation:
+        """What is known now."""
+        env, seen, holds = self.env, self.in_sight(), self.env.holds
+        things = [f"take {n}" if n in env.body.things else f"open {n}" for n in seen if n != "person"]
+        can = ["give"] * ("person" in seen) + ["leave"] if holds else things
+        self.words = (*(f"go {room}" for room in sorted({*env.ground.room_of_cell} - {""})), *can)
+        extras, zeros = SkillExtras(seen, holds, env.room_at(env.body.position), outcome), np.zeros(len(self.words))
+        candidates = interface.Candidates(zeros, zeros, zeros.astype(int), zeros == 0, self.words)
+        sight, can_ask = interface.Sight(env.world.name, 0), BRING_QUESTIONS[: None if holds else -1]
+        first = (sight, env.turn, 0, candidates, env.heard, None, interface.Mode.MAIN, can_ask, None)
+        return interface.Observation(*first, time=self.time, time_on_task=self.time, extras=extras)
 
     def in_sight(self) -> dict[str, str]:
-        """Things, closed parts and the person in sight while the head turns about, the nearest first, in words."""
+        """Things, closed parts and the person in sight while the head turns about, in words."""
         body, env, of = self.env.body, self.env, self.env.world.house.placement_by_id
         eye, geom, seen = body.data.cam_xpos[body.model.camera("robot/head").id].copy(), np.zeros(1, np.int32), []
-        shut = {n: body.handles[n.replace("/", "_")] for n, x in env.openness.items() if "/" in n and x < 0.5}
-        bodies, found = {**body.things, **shut, "person": -1}, self._found
-        for name, b in bodies.items():
-            at = np.array([*env.person, 1.2]) if b < 0 else body.data.xipos[b]
-            metres = float(np.linalg.norm(way := at - eye))
-            if metres > SEES:
+        shut = {n: body.handles[n.replace("/", "_")] for n, x in env.openness.items() if "/" in n and x < OPENED}
+        found = self._found()
+        for name, b in {**body.things, **shut, "person": -1}.items():
+            way = (body.data.xipos[b] if b >= 0 else np.array([*env.person, 1.2])) - eye
+            if (metres := float(np.linalg.norm(way))) > SEES or name == body.held:
                 continue
-            reached = mujoco.mj_ray(body.model, body.data, eye, way / metres, None, 1, body.root, geom)
-            if 0 <= reached <= metres - 0.15 and body.model.geom_bodyid[geom[0]] != b and name not in found:
-                continue
-            p = of.get(name.partition("/")[0])
-            noun = " ".join([*self._look_of(p)[:1], p.object_class]) if p and "/" not in name else ""
-            noun = noun or (f"closed {name.partition('/')[2]} of the {p.object_class}" if p else "whoever asked you")
-            bearing = math.atan2(way[1], way[0]) - body.yaw
-            seen.append((metres, name, f"{noun}, {metres:.1f} m, {side(float(wrap(bearing)))}"))
+            met = mujoco.mj_ray(body.model, body.data, eye, way / metres, None, 1, body.root, geom)
+            seen_into = name in found and metres < REACHED_IN
+            if seen_into or not 0 <= met <= metres - 0.15 or body.model.geom_bodyid[geom[0]] == b:
+                (thing, _, part), noun = name.partition("/"), "whoever asked you"
+                if thing in of:
+                    words = [f"closed {part} of the"] if part else self._look_of(of[thing])[:1]
+                    noun = " ".join([*words, of[thing].object_class])
+                bearing = float(wrap(math.atan2(way[1], way[0]) - body.yaw))
+                seen.append((metres, name, f"{noun}, {metres:.1f} m, {side(bearing)}"))
         return {name: words for _, name, words in sorted(seen)}
 
-    @property
-    def _found(self) -> list[str]:
-        """Things in the furniture that stands open, near enough to look into."""
-        env, found = self.env, []
-        for part, x in env.openness.items():
-            if "/" in part and x >= 0.5 and math.dist(env.body.position, (space := inside(env, part))[0][:2]) < 1.5:
-                found += [n for n in env.body.things if (np.abs(env.body.thing(n) - space[0]) <= space[1]).all()]
+    def _found(self) -> dict[str, str]:
+        """Things in furniture that stands open, and the furniture."""
+        found, thing = dict[str, str](), self.env.body.thing
+        for part in (n for n, x in self.env.openness.items() if "/" in n and x >= OPENED):
+            middle, half = inside(self.env, part)
+            within = [n for n in self.env.body.things if (np.abs(thing(n) - middle) <= half).all()]
+            found |= dict.fromkeys(within, part.partition("/")[0])
         return found
 
     # Skills -----------------------------------------------------------------------------------
 
     def go(self, room: str) -> str:
         """Drive to the middle of a room, or when it has been there, to what is farthest from where it was."""
-        ground = self.env.ground
-        cells, been = np.flatnonzero(ground.room_of_cell == room), self._been.setdefault(room, [])
-        middle = np.linalg.norm(ground.xy[cells] - ground.xy[cells].mean(0), axis=1)
-        away = np.linalg.norm(ground.xy[cells, None] - ground.xy[been][None], axis=2).min(1) if been else -middle
+        xy, been = self.env.ground.xy, self._been.setdefault(room, [])
+        cells = np.flatnonzero(self.env.ground.room_of_cell == room)
+        away = -np.linalg.norm(xy[cells] - xy[cells].mean(0), axis=1)
+        if been:
+            away = np.linalg.norm(xy[cells, None] - xy[been][None], axis=2).min(1)
         been.append(int(cells[away.argmax()]))
         return f"you are {'' if self._drive(np.array(been[-1:])) else 'not '}there"
 
     def open(self, part: str) -> str:
         """Take a handle and pull."""
         env, body, name = self.env, self.env.body, part.replace("/", "_")
-        handle, yaw = body.handles[name], env.world.house.placement_by_id[part.partition("/")[0]].yaw
+        handle = body.handles[name]
         at, (way, aside) = body.data.xipos[handle].copy(), self._way(handle)
-        stand = at[:2] + 0.5 * np.array([math.sin(yaw), -math.cos(yaw)]) + 0.3 * aside
-        for cells in self._spots(np.array([*stand, 0.0]), 0.0, 0.4, best=0.0):
+        stand = at[:2] + 0.5 * self._front(part.partition("/")[0]) + 0.3 * aside
+        for cells in self._spots(stand, 0.0, 0.7, best=0.0):
             if self._reach(cells, body.data.xipos[handle]):
-                self.hold = True
-                self._wait(3)
+                self._hold = True
+                self._act(times=3)
                 for _ in range(80):
                     way, aside = self._way(handle)
                     if body.held != name or env.openness[part] > 0.95 or self.over:
                         break
-                    self._follow(body.data.xipos[handle] + 0.06 * way, aside.any())
-                self._let_go()
-            if self.over or env.openness[part] >= 0.5:
+                    self._follow(body.data.xipos[handle] + 0.06 * way, turns=bool(aside.any()))
+                self.leave()
+            if self.over or env.openness[part] >= OPENED:
                 break
-        return f"{part} is {'open' if env.openness[part] >= 0.5 else 'not open'}"
+        return f"{part} is {'open' if env.openness[part] >= OPENED else 'not open'}"
 
     def take(self, thing: str) -> str:
         """Drive up to a thing and take it."""
-        body = self.env.body
-        here = np.array([self.env.ground.cell_at(body.position)])
-        near = [here] if np.linalg.norm(body.position - body.thing(thing)[:2]) < 0.95 else []
-        spots = near + self._spots(body.thing(thing), 0.4, 0.95)
+        body, at = self.env.body, self.env.body.thing(thing)
+        spots = self._spots(at, 0.4, 0.95)
+        if holder := self._found().get(thing):
+            spots = self._spots(at[:2] + 0.65 * self._front(holder), 0.0, 0.4, best=0.0)
+        if math.dist(body.position, at[:2]) < 0.95:
+            spots.insert(0, np.array([self.env.ground.cell_at(body.position)]))
         for cells, above in [(c, a) for c in spots for a in (0.0, 0.2)]:
-            if not self._reach(cells, body.thing(thing), above):
-                continue
-            self.hold = True
-            self._wait(2)
-            if body.held == thing:
-                self._arm(min(1.4, float(body.hand[2]) + 0.12), None)
-                self._arm(None, 0.0)
-                return f"you hold {thing}"
-            self._let_go()
+            if self._reach(cells, body.thing(thing), above):
+                self._hold = True
+                self._act(times=2)
+                if body.held == thing:
+                    self._arm(min(1.4, float(body.hand[2]) + 0.12), None)
+                    self._arm(None, 0.0)
+                    return f"you hold {thing}"
+                self.leave()
             if self.over:
                 break
         return f"you could not take {thing}"
 
-    def give(self) -> str:
+    def give(self, _: str = "") -> str:
         """Bring what is held to the person."""
-        for _ in range(4):
-            self._drive(self._cells(self.env.person, 0.35, 0.6))
+        for _k in range(4):
+            far = np.linalg.norm(self.env.ground.xy - self.env.person, axis=1)
+            self._drive(np.flatnonzero((far >= 0.35) & (far <= 0.6)))
             self._turn(self.env.person)
             self._arm(1.0, min(0.4, max(0.0, math.dist(self.env.body.position, self.env.person) - 0.5)))
-            if self.over:
-                break
         return "it is not what was asked for, or the way is blocked"
 
-    def leave(self) -> str:
-        """Put down what is held."""
-        self._let_go()
+    def leave(self, _: str = "") -> str:
+        """Let go, and draw the arm in."""
+        self._hold = False
+        self._act()
+        self._arm(None, 0.0)
         return "you put it down"
 
     # How --------------------------------------------------------------------------------------
 
-    def _step(self, base: tuple[float, float, float] = (0.0, 0.0, 0.0), *, ask: str = "") -> bool:
-        """One action; True when the episode is over."""
-        if not self.over:
-            spoken = [float(word == ask) for word in self.env.spoken]
-            action = np.array([*base, *self.arm, float(self.hold), *spoken])
-            self._watch(action)
-            _, _, ended, cut, self.info = self.env.step(action)
-            self.over = ended or cut
+    def _act(self, ahead: float = 0.0, left: float = 0.0, turn: float = 0.0, *, ask: str = "", times: int = 1) -> bool:
+        """One action, or several times the same; True when the episode is over."""
+        for _ in range(times):
+            if not self.over:
+                asks = [float(word == f"ask {ask}") for word in self.env.spoken]
+                action = np.array([ahead, left, turn, *self._set, float(self._hold), *asks])
+                self._watch(self._seen, action)
+                self._seen, _, ended, late, self.info = self.env.step(action)
+                self.over = ended or late
         return self.over
-
-    def _wait(self, steps: int) -> None:
-        for _ in range(steps):
-            self._step()
-
-    def _let_go(self) -> None:
-        self.hold = False
-        self._wait(1)
-        self._arm(None, 0.0)
 
     def _aim(self, height: float | None, reach: float | None) -> None:
         """Set the hand's height, metres above the floor, and how far it is out; as they are where None."""
-        target = self.env.middle + self.env.half * self.arm
+        target = self.env.middle + self.env.half * self._set
         if height is not None:
             target[0] = np.clip(height - self.env.body.placed.pose[2], 0.1, 1.45)
         if reach is not None:
             target[1] = np.clip(reach / 4, 0.0, 0.2)
-        self.arm = (target - self.env.middle) / self.env.half
+        self._set = (target - self.env.middle) / self.env.half
 
     def _arm(self, height: float | None, reach: float | None) -> None:
         """Bring the hand there, and wait until it is."""
         self._aim(height, reach)
         for k in range(20):
             before = self.env.body.hand
-            if self._step() or (k > 1 and np.linalg.norm(self.env.body.hand - before) < 0.003):
+            if self._act() or (k > 1 and np.linalg.norm(self.env.body.hand - before) < 0.003):
                 break
 
     def _way(self, handle: int) -> tuple[np.ndarray, np.ndarray]:
         """(3,) unit in which a handle opens, and (2,) unit from an upright hinge to it, or zeros."""
         model, data = self.env.body.model, self.env.body.data
         joint = model.body_jntadr[model.body_parentid[handle]]
-        way, arm = data.xaxis[joint].copy(), data.xipos[handle] - data.xanchor[joint]
+        axis, arm = data.xaxis[joint].copy(), data.xipos[handle] - data.xanchor[joint]
         if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
-            return way, np.zeros(2)
-        upright = abs(way[2]) > 0.5
-        way = np.cross(way, arm)
-        return way / np.linalg.norm(way), arm[:2] / np.linalg.norm(arm[:2]) if upright else np.zeros(2)
+            return axis, np.zeros(2)
+        way = np.cross(axis, arm)
+        return way / np.linalg.norm(way), arm[:2] / np.linalg.norm(arm[:2]) * (abs(axis[2]) > 0.5)
+
+    def _front(self, furniture: str) -> np.ndarray:
+        """(2,) unit to which the front of furniture looks."""
+        yaw = self.env.world.house.placement_by_id[furniture].yaw
+        return np.array([math.sin(yaw), -math.cos(yaw)])
 
     def _follow(self, point: np.ndarray, turns: bool) -> None:
         """One action after which the hand is nearer to a point: by turning and reaching, or by driving."""
-        to = point[:2] - self.env.body.position
-        if not turns and np.linalg.norm(to) < 0.45:
-            self._step((-0.5, 0.0, 0.0))
+        away = math.dist(point[:2], self.env.body.position)
+        if not turns and away < 0.45:
+            self._act(-0.5)
             return
-        self._aim(float(point[2]), float(np.linalg.norm(to)) - ARM)
-        off = float(wrap(math.atan2(to[1], to[0]) - self.env.body.yaw))
-        self._step((0.0, 0.0, float(np.clip(2.5 * off, -1, 1))))
+        self._aim(float(point[2]), away - ARM)
+        self._act(turn=float(np.clip(2.5 * self._bearing(point), -1, 1)))
 
-    def _drive(self, cells: np.ndarray) -> bool:
-        """Along a wide way to the nearest of some cells."""
-        if not len(cells):
-            return False
-        body, ground = self.env.body, self.env.ground
-        ways, stuck, tries, last = ground.wide_ways(cells), 0, 0, body.position
-        for _ in range(600):
-            way = ground.xy[ways.cells(ground.cell_at(body.position))]
-            far, to = float(np.linalg.norm(way[-1] - body.position)), way[min(3, len(way) - 1)] - body.position
-            if far < 0.06:
-                return True
-            turn = float(wrap(math.atan2(to[1], to[0]) - body.yaw))
-            speed = min(1.0, 0.15 + far) if abs(turn) < 0.6 or far < 0.3 else 0.0
-            ahead = np.array([math.cos(turn), math.sin(turn)])
-            if self._step((*speed * ahead, float(np.clip(1.5 * turn, -1, 1)) if far > 0.3 else 0.0)):
-                return False
-            stuck = stuck + 1 if np.linalg.norm(body.position - last) < 0.005 and speed else 0
-            last = body.position
-            if stuck > 8:
-                for _ in range(6):
-                    self._step((*-0.7 * ahead, 0.3 * (-1) ** tries))
-                stuck, tries = 0, tries + 1
-                if tries > 3:
-                    return False
-        return False
+    def _bearing(self, point: np.ndarray) -> float:
+        to = point[:2] - self.env.body.position
+        return float(wrap(math.atan2(to[1], to[0]) - self.env.body.yaw))
 
     def _turn(self, point: np.ndarray) -> None:
         """Face a point."""
         for _ in range(60):
-            to = point[:2] - self.env.body.position
-            off = float(wrap(math.atan2(to[1], to[0]) - self.env.body.yaw))
-            if abs(off) < 0.02 or self._step((0.0, 0.0, float(np.clip(2.5 * off, -1, 1)))):
+            off = self._bearing(point)
+            if abs(off) < 0.02 or self._act(turn=float(np.clip(2.5 * off, -1, 1))):
                 return
 
-    def _cells(self, point: np.ndarray, low: float, high: float) -> np.ndarray:
-        far = np.linalg.norm(self.env.ground.xy - point[:2], axis=1)
-        return np.flatnonzero((far >= low) & (far <= high))
+    def _drive(self, cells: np.ndarray) -> bool:
+        """Along a wide way to the nearest of some cells, at least one."""
+        body, ground, stuck, tries, last = self.env.body, self.env.ground, 0, 0, self.env.body.position
+        ways = ground.wide_ways(cells)
+        for _ in range(600):
+            if tries > 3 or self.over:
+                break
+            way = ground.xy[ways.cells(ground.cell_at(body.position))]
+            if (far := math.dist(way[-1], body.position)) < 0.06:
+                return True
+            turn = self._bearing(way[min(3, len(way) - 1)])
+            speed = min(1.0, 0.15 + far) if abs(turn) < 0.6 or far < 0.3 else 0.0
+            ahead, left = math.cos(turn), math.sin(turn)
+            self._act(speed * ahead, speed * left, float(np.clip(1.5 * turn, -1, 1)) * (far > 0.3))
+            stuck = stuck + 1 if speed and math.dist(body.position, last) < 0.005 else 0
+            last = body.position
+            if stuck > 8:
+                self._act(-0.7 * ahead, -0.7 * left, 0.3 * (-1) ** tries, times=6)
+                stuck, tries = 0, tries + 1
+        return False
 
     def _spots(self, point: np.ndarray, low: float, high: float, best: float = 0.65) -> list[np.ndarray]:
-        """Up to five places between two distances from a point, apart from each other, the one nearest to `best`
-        first."""
-        cells, xy, spots = self._cells(point, low, high), self.env.ground.xy, list[np.ndarray]()
-        far = np.linalg.norm(xy[cells] - point[:2], axis=1)
-        for cell in cells[np.argsort(np.abs(far - best), kind="stable")]:
-            if all(np.linalg.norm(xy[cell] - xy[s[0]]) > 0.25 for s in spots) and len(spots) < 5:
-                spots.append(np.array([cell]))
+        """Up to five cells between two distances from a point, apart from each other, the nearest to `best` first."""
+        xy, spots = self.env.ground.xy, list[np.ndarray]()
+        far = np.linalg.norm(xy - point[:2], axis=1)
+        for cell in np.argsort(np.abs(far - best), kind="stable"):
+            apart = low <= far[cell] <= high and all(math.dist(xy[cell], xy[s[0]]) > 0.25 for s in spots)
+            spots += [np.array([cell])] if apart and len(spots) < 5 else []
         return spots
 
     def _reach(self, cells: np.ndarray, point: np.ndarray, above: float = 0.0) -> bool:
@@ -322,15 +295,3 @@ class Skills:
         if above:
             self._arm(float(point[2]) + 0.05, None)
         return not self.over
-
-
-def play_skills(skills: Skills, agent: Policy | None, seed: int, world: str | None = None) -> dict[str, Any]:
-    """Facts of an episode; without an agent that of an expert, who knows where everything is."""
-    o, memory, goal = skills.reset(seed, world), None, skills.env.goal
-    for words in (*[f"open {goal.part}"] * bool(goal.part), f"take {goal.thing}", "give") if agent is None else ():
-        skills.do(words)
-    while agent is not None and o is not None:
-        [action], memory = agent.act([o], memory, rngs=[stream(seed, "skills", skills.time)])
-        o = skills.step(action)
-    facts = {name: skills.info[name] for name in ("success", "spl", "metres", "seconds", "price")}
-    return {**facts, "hidden": bool(goal.part), "asked": len(skills.env.replies), "fallen": len(skills.info["fallen"])}

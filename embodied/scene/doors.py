@@ -9,6 +9,7 @@ and reads house_metadata.json.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -96,28 +97,26 @@ def is_of_house(model: mujoco.MjModel, body: int, house: House) -> bool:
     return root in house.placement_by_id or (stem in names and root != stem)
 
 
-def ways_open(model: mujoco.MjModel) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """All that turns or slides: names as of `openness`, addresses in qpos, and its value when it is open."""
-    names, adr, reach = list[str](), [], []
+@functools.lru_cache(maxsize=4)
+def _ways_open(model: mujoco.MjModel) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """All that turns or slides: names, addresses in qpos, and its value when it is open."""
+    ways = []
     for j in range(model.njnt):
         body, (stem, hinge, _) = model.jnt_bodyid[j], model.joint(j).name.partition("doorhinge")
-        root = model.body(model.body_rootid[body]).name
-        of_part = float(model.jnt_user[j, 0]) if model.nuser_jnt else 0.0
-        if of_part > 0 or hinge:
-            part = model.body(body).name.removeprefix(f"{root}_")
-            names.append(f"{root}/{part}" if of_part > 0 else stem.rpartition("_")[0])
-            adr.append(model.jnt_qposadr[j])
-            reach.append(of_part if of_part > 0 else WIDEST)
-    return names, np.array(adr, int), np.array(reach)
+        root, reach = model.body(model.body_rootid[body]).name, model.jnt_user[j, 0] if model.nuser_jnt else 0.0
+        if reach > 0:
+            ways.append((f"{root}/{model.body(body).name.removeprefix(f'{root}_')}", model.jnt_qposadr[j], reach))
+        elif hinge:
+            ways.append((stem.rpartition("_")[0], model.jnt_qposadr[j], WIDEST))
+    names, adr, reaches = zip(*ways) if ways else ((), (), ())
+    return [*names], np.array(adr, int), np.array(reaches)
 
 
-def openness(
-    model: mujoco.MjModel, data: mujoco.MjData, ways: tuple[list[str], np.ndarray, np.ndarray] | None = None
-) -> dict[str, float]:
+def openness(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, float]:
     """How far all that turns or slides is open, 0 to 1: by opening, of a pair the wider leaf, and of furniture by
-    placement id and part; `ways` of the model, where they are known."""
+    placement id and part."""
     out: dict[str, float] = {}
-    names, adr, reach = ways or ways_open(model)
+    names, adr, reach = _ways_open(model)
     for name, x in zip(names, np.clip(data.qpos[adr] / reach, 0, 1).tolist(), strict=True):
         out[name] = max(out.get(name, 0.0), x)
     return out
