@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+from skills import Skills
 
 from embodied.agents.language_models.agent import LanguageModelAgent
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
@@ -26,7 +27,6 @@ from embodied.datasets.lerobot import STEP_COLUMNS, Writer, whole_folder
 from embodied.gym.bring import BringEnv
 from embodied.gym.drive import chosen_worlds
 from embodied.gym.robot import CONTROL, RobotSettings
-from embodied.gym.skills import Skills
 from embodied.interface import Action, Actions, Ask, Intention, Move, Observation, Observations, Policy, Rngs, Stop
 from embodied.seeds import stream
 

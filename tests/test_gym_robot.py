@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
+import importlib
 import json
 import math
 import sys
@@ -26,7 +26,6 @@ from embodied.agents.language_models.agent import LanguageModelAgent
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
 from embodied.gym.bring import BringEnv
 from embodied.gym.robot import RobotEnv, RobotSettings, make
-from embodied.gym.skills import Skills
 from embodied.interface import Ask, Intention, Move
 from embodied.world import open_world
 
@@ -34,13 +33,19 @@ pytestmark = pytest.mark.gl
 SMALL = {"size": (32, 32), "observations": ()}
 
 
+EXAMPLES = str(Path(__file__).parents[1] / "examples")
+
+
 def example(name):
-    spec = importlib.util.spec_from_file_location(
-        name.removesuffix(".py"), Path(__file__).parents[1] / "examples" / name
-    )
-    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    """A script of examples/ as a module."""
+    sys.path.insert(0, EXAMPLES)
+    try:
+        return importlib.import_module(name.removesuffix(".py"))
+    finally:
+        sys.path.remove(EXAMPLES)
+
+
+bring, others, Skills = example("bring_me.py"), example("other_robots.py"), example("skills.py").Skills
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +101,6 @@ def skills(world):
 
 
 def test_who_knows_where_it_is_brings_it_and_others_find_it(skills):
-    bring = example("bring_me.py")
     for seed in range(3):
         for name in ("expert", "always asks"):
             facts = bring.episode(skills, bring.PLAYERS[name], seed)
@@ -131,7 +135,7 @@ def test_a_language_model_plays_by_skills_and_its_answers_play_again(skills, tmp
         wants = ["give", "take mug_1", *["ask region"] * (" . " not in text or "you hold mug_1" in text), *told]
         return said(json.dumps({"reason": "", "action": next((w for w in wants if w in can), can[0])}))
 
-    episode, cache = example("bring_me.py").episode, AnswerCache(tmp_path / "answers.sqlite")
+    episode, cache = bring.episode, AnswerCache(tmp_path / "answers.sqlite")
     with ChatServer(speaks) as server:
         client = Client(ServerSettings("scripted", server.url), cache)
         facts = episode(skills, LanguageModelAgent(client), 1)
@@ -143,7 +147,6 @@ def test_a_language_model_plays_by_skills_and_its_answers_play_again(skills, tmp
 
 
 def test_episodes_become_lerobot_data_with_what_was_said(world, tmp_path):
-    bring = example("bring_me.py")
     settings = RobotSettings(task="bring", size=(32, 32), observations=("rgb",))
     env = BringEnv({world.name: world}, settings)
     steps = bring.record(env, tmp_path / "out", range(2), bring.Searcher(Intention.REGION))
@@ -159,7 +162,6 @@ def test_episodes_become_lerobot_data_with_what_was_said(world, tmp_path):
 def test_an_arm_of_dm_control_on_a_cart_finds_things(world):
     from dm_control.third_party import kinova
 
-    others = example("other_robots.py")
     arm = others.on_a_cart(mujoco.MjSpec.from_file(f"{kinova.__path__[0]}/jaco_arm.xml"))
     env = RobotEnv({world.name: world}, RobotSettings(robot=arm, hand="arm_wristsite", task="find", **SMALL))
     assert env.commands[:3] == ("ahead", "left", "turn") and "robot/arm_joint_1 rad" in " ".join(env.body.feels)

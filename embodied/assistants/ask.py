@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -110,6 +112,42 @@ class AskAssistant:
             return "You are there.", subtask
         text = self._language.route(s.world, nodes, s.pose.yaw, rng=rng)
         return text + ("" if nodes == whole else " From there it is further."), subtask
+
+
+BRING_QUESTIONS = (Intention.REGION, Intention.APPEARANCE, Intention.ROUTE, Intention.CONFIRM)
+
+
+@dataclass(frozen=True)
+class BringTruth:
+    """Knowledge of who asked for a thing to be brought, besides the situation: placements that the request fits, the
+    thing that the robot holds and the class of the furniture that is shut around the thing, '' for none, and the room
+    in which the person is by now."""
+
+    possible: tuple[str, ...]
+    held: str
+    furniture: str
+    room: str
+
+
+class Requester(AskAssistant):
+    """Knows the house as it is now. Of a robot that holds something, the question of the room is about the person."""
+
+    def intentions(self, situation: Situation) -> tuple[Intention, ...]:
+        """Confirm what is held, all others always."""
+        return BRING_QUESTIONS if situation.extras.held else BRING_QUESTIONS[:-1]
+
+    def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
+        truth: BringTruth = situation.extras
+        if question is Intention.CONFIRM:
+            yes = truth.held == described_goal(situation).placement
+            text = "Yes, it is this one." if yes else "No, it is not this one."
+            return Reply(text=text, intention=question, ruled_out=() if yes else (truth.held,))
+        if question is Intention.REGION and truth.held:
+            room = situation.world.house.room_by_id[truth.room].kind.replace("_", " ")
+            return Reply(text=f"I am in the {room}.", intention=question)
+        reply = super().answer(situation, question, rng=rng)
+        inside = f" It is inside the {truth.furniture}." if truth.furniture else ""
+        return dataclasses.replace(reply, text=f"{reply.text}{inside}") if question is Intention.APPEARANCE else reply
 
 
 def described_goal(s: Situation) -> FindDescribed:

@@ -16,7 +16,7 @@ import numpy as np
 
 from embodied import interface
 from embodied.assets.people import people
-from embodied.assistants.bring import BRING_QUESTIONS, BringTruth, Requester
+from embodied.assistants.ask import BRING_QUESTIONS, BringTruth, Requester
 from embodied.envs.ask import Prices
 from embodied.gym import robot
 from embodied.house.moment import MovingPerson
@@ -100,7 +100,8 @@ class BringEnv(robot.RobotEnv):
         fits = tuple(q.id for q in alike if look(q)[:1] == look(p)[:1])
         others = tuple(q.id for q in alike if q.id not in fits)
         eye = np.array([*self.body.position, house.storeys[0].elevation + EYE])
-        pose = interface.Pose(int(np.linalg.norm(graph.positions - eye, axis=1).argmin()), self.turn)
+        turn = round(self.body.yaw / interface.STEP) % interface.TURNS
+        pose = interface.Pose(int(np.linalg.norm(graph.positions - eye, axis=1).argmin()), turn)
         away = np.linalg.norm(graph.positions[:, :2] - at[:2], axis=1)
         goals = (int((away + 99.0 * (np.array(graph.room_of_node) != p.room)).argmin()),)
         goal = interface.FindDescribed(p.object_class, thing, fits, others, look(p)[:1])
@@ -112,11 +113,6 @@ class BringEnv(robot.RobotEnv):
         none = np.zeros(0)
         nothing, main = interface.Candidates(none, none, none, none), interface.Mode.MAIN
         return interface.Situation(place, task, pose, main, goals, None, (), nothing, 0, 0, extras=truth)
-
-    @property
-    def turn(self) -> int:
-        """Its yaw in steps of 30 degrees."""
-        return round(self.body.yaw / interface.STEP) % interface.TURNS
 
     def room_at(self, point: np.ndarray) -> str:
         """The room of the floor nearest to a point."""
@@ -137,8 +133,8 @@ def inside(env: robot.RobotEnv, part: str) -> tuple[np.ndarray, np.ndarray]:
     """(3,) middle, world, and (3,) half sides, metres, of the space that a part of furniture closes; or zeros."""
     thing, _, name = part.partition("/")
     model, names = env.body.model, (f"{thing}_reg_int_{name}", f"{thing}_reg_int")
-    found = [g for n in names if (g := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, n)) >= 0]
-    return (env.body.data.geom_xpos[found[0]], model.geom_size[found[0]]) if found else (np.zeros(3), np.zeros(3))
+    geoms = [g for n in names if (g := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, n)) >= 0]
+    return (env.body.data.geom_xpos[geoms[0]], model.geom_size[geoms[0]]) if geoms else (np.zeros(3), np.zeros(3))
 
 
 def hidden_or_not(env: robot.RobotEnv, rng: np.random.Generator) -> robot.RobotGoal | None:

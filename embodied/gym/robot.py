@@ -92,7 +92,7 @@ class RobotTask:
     succeeded: Callable[[Any], bool]
     """Of the env."""
     env: Callable[..., RobotEnv] | None = None
-    """What plays it; RobotEnv where not given."""
+    """Its environment; RobotEnv where not given."""
 
 
 ROBOT_TASKS: dict[str, RobotTask] = {}
@@ -167,6 +167,7 @@ class RobotEnv(LiveEnv):
         self.body.step(0.4)
         self.body.metres, self._fallen = 0.0, set[str]()
         self.heights = {i: float(self.body.thing(i)[2]) for i in self.body.things}
+        self._lowest = np.array([*self.heights.values()]) - FALLS
         return self._look(), {"world": name, "request": self.goal.request, **self._facts()}
 
     def _begin(self, rng: np.random.Generator) -> int:
@@ -191,14 +192,15 @@ class RobotEnv(LiveEnv):
         body.data.ctrl[body.arm] = self.middle + self.half * [*named.values()][rolls : rolls + len(body.arm)]
         body.step(CONTROL, holding=named.get("hold", 0.0) > 0.5)
         self.time += CONTROL
-        self._fallen |= {i for i, z in self.heights.items() if i != body.held and body.thing(i)[2] < z - FALLS}
+        low = body.data.xipos[[*body.things.values()], 2] < self._lowest
+        self._fallen |= {i for i, down in zip(body.things, low) if down and i != body.held}
         self.succeeded = self.task.succeeded(self)
         late = self.time >= self.settings.seconds - 1e-9 and not self.succeeded
         self.ended = self.succeeded or late
         return self._look(), float(self.succeeded) - 0.001 - price, self.succeeded, late, self._facts()
 
     def _spoke(self, named: Mapping[str, float]) -> float:
-        """What the numbers of `spoken` do, before the rest of an action; returns the price."""
+        """Do what the numbers of `spoken` say, before the rest of an action; returns the price."""
         return 0.0
 
     def _facts(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Skills: a robot of Robot-v0's 'bring' is told to go, open, take, give, leave and ask, as any agent is.
+"""Skills: a robot of Robot-v0's 'bring' is told to go, open, take, give, leave and ask (see bring_me.py).
 
     skills = Skills(gymnasium.make("embodied/Robot-v0", task="bring", observations=()).unwrapped)
     observation = skills.reset(0)
@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 
 from embodied import interface
-from embodied.assistants.bring import BRING_QUESTIONS
+from embodied.assistants.ask import BRING_QUESTIONS
 from embodied.assistants.descriptions import side
 from embodied.geometry import wrap
 from embodied.gym.bring import BringEnv, inside
@@ -40,7 +40,7 @@ class SkillExtras(interface.Extras):
     holds: str
     room: str
     outcome: str
-    """What came of the last skill."""
+    """Of the last skill, in words."""
 
     def lines(self, turn: int) -> tuple[str, ...]:
         lines = (f"you are in {self.room}", f"you hold {self.holds or 'nothing'}", self.outcome)
@@ -79,15 +79,16 @@ class Skills:
         return skill(what)
 
     def look(self, outcome: str) -> interface.Observation:
-        """What is known now."""
+        """The observation as of now."""
         env, seen, holds = self.env, self.in_sight(), self.env.holds
         things = [f"take {n}" if n in env.body.things else f"open {n}" for n in seen if n != "person"]
         can = ["give"] * ("person" in seen) + ["leave"] if holds else things
         self.words = (*(f"go {room}" for room in sorted({*env.ground.room_of_cell} - {""})), *can)
         extras, zeros = SkillExtras(seen, holds, env.room_at(env.body.position), outcome), np.zeros(len(self.words))
         candidates = interface.Candidates(zeros, zeros, zeros.astype(int), zeros == 0, self.words)
+        turn = round(env.body.yaw / interface.STEP) % interface.TURNS
         sight, can_ask = interface.Sight(env.world.name, 0), BRING_QUESTIONS[: None if holds else -1]
-        first = (sight, env.turn, 0, candidates, env.heard, None, interface.Mode.MAIN, can_ask, None)
+        first = (sight, turn, 0, candidates, env.heard, None, interface.Mode.MAIN, can_ask, None)
         return interface.Observation(*first, time=self.time, time_on_task=self.time, extras=extras)
 
     def in_sight(self) -> dict[str, str]:
@@ -95,13 +96,13 @@ class Skills:
         body, env, of = self.env.body, self.env, self.env.world.house.placement_by_id
         eye, geom, seen = body.data.cam_xpos[body.model.camera("robot/head").id].copy(), np.zeros(1, np.int32), []
         shut = {n: body.handles[n.replace("/", "_")] for n, x in env.openness.items() if "/" in n and x < OPENED}
-        found = self._found()
+        lying = self._in_open()
         for name, b in {**body.things, **shut, "person": -1}.items():
             way = (body.data.xipos[b] if b >= 0 else np.array([*env.person, 1.2])) - eye
             if (metres := float(np.linalg.norm(way))) > SEES or name == body.held:
                 continue
             met = mujoco.mj_ray(body.model, body.data, eye, way / metres, None, 1, body.root, geom)
-            seen_into = name in found and metres < REACHED_IN
+            seen_into = name in lying and metres < REACHED_IN
             if seen_into or not 0 <= met <= metres - 0.15 or body.model.geom_bodyid[geom[0]] == b:
                 (thing, _, part), noun = name.partition("/"), "whoever asked you"
                 if thing in of:
@@ -111,14 +112,14 @@ class Skills:
                 seen.append((metres, name, f"{noun}, {metres:.1f} m, {side(bearing)}"))
         return {name: words for _, name, words in sorted(seen)}
 
-    def _found(self) -> dict[str, str]:
+    def _in_open(self) -> dict[str, str]:
         """Things in furniture that stands open, and the furniture."""
-        found, thing = dict[str, str](), self.env.body.thing
+        holders, thing = dict[str, str](), self.env.body.thing
         for part in (n for n, x in self.env.openness.items() if "/" in n and x >= OPENED):
             middle, half = inside(self.env, part)
             within = [n for n in self.env.body.things if (np.abs(thing(n) - middle) <= half).all()]
-            found |= dict.fromkeys(within, part.partition("/")[0])
-        return found
+            holders |= dict.fromkeys(within, part.partition("/")[0])
+        return holders
 
     # Skills -----------------------------------------------------------------------------------
 
@@ -156,7 +157,7 @@ class Skills:
         """Drive up to a thing and take it."""
         body, at = self.env.body, self.env.body.thing(thing)
         spots = self._spots(at, 0.4, 0.95)
-        if holder := self._found().get(thing):
+        if holder := self._in_open().get(thing):
             spots = self._spots(at[:2] + 0.65 * self._front(holder), 0.0, 0.4, best=0.0)
         if math.dist(body.position, at[:2]) < 0.95:
             spots.insert(0, np.array([self.env.ground.cell_at(body.position)]))
