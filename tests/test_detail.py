@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from embodied.assets.materials import MATERIALS
-from embodied.assets.materials.detail import pyramid
 from embodied.assets.records import DETAILS
 from embodied.render.camera import Camera, camera_at
-from embodied.render.detail import Detail
+from embodied.render.detail import Detail, pyramid
 from embodied.render.gloss import _directions
 
 SIZE = 128

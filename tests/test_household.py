@@ -13,10 +13,9 @@ import shapely
 from embodied.assets.catalogue import load_catalogue
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.furnish import groups, likes
-from embodied.generate.furnish.context import Context
+from embodied.generate.furnish.context import Context, Stock
 from embodied.generate.furnish.smalls import CarrierSurface, SurfaceOccupancy
 from embodied.generate.furnish.space import Thing, overlap, room_space
-from embodied.generate.furnish.stock import Stock
 from embodied.generate.furnish.tables import AT, LIKES, tables
 from embodied.generate.household import HABITS, Household, draw_household, household_of
 from embodied.geometry import rectangle

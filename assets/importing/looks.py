@@ -149,7 +149,7 @@ class Covering:
     draw: Callable[[Canvas], np.ndarray]
     """(n, n, 3) or (n, n, 1) factors, mean about 1."""
     detail: str
-    """The detail that it shows from nearby (embodied.assets.materials.detail)."""
+    """The detail that it shows from nearby (embodied.render.detail)."""
     grained: bool = False
     """Runs along the longest side of every board."""
 

@@ -15,12 +15,11 @@ import numpy as np
 
 from embodied.assets.catalogue import Catalogue
 from embodied.generate.config import RETRIES
-from embodied.generate.furnish.context import Context
+from embodied.generate.furnish.context import Context, Stock
 from embodied.generate.furnish.hanging import hang_all
 from embodied.generate.furnish.room import furnish_room, place_own, shortage
 from embodied.generate.furnish.smalls import clutter
 from embodied.generate.furnish.space import RoomSpace, Thing, room_space
-from embodied.generate.furnish.stock import Stock
 from embodied.generate.furnish.tables import tables_of
 from embodied.generate.household import household_of
 from embodied.geometry import wrap

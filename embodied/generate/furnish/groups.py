@@ -13,10 +13,9 @@ import shapely
 
 from embodied.assets.records import Asset, Size
 from embodied.generate.furnish.arrange import RUG_HEIGHT, Item, ScoredPose, floor_poses, is_flat, wall_poses
-from embodied.generate.furnish.context import Context
+from embodied.generate.furnish.context import NO_LEAST_SIZE, NO_MOST_SIZE, Context
 from embodied.generate.furnish.likes import LIKES, CandidateSpot, depth_before
 from embodied.generate.furnish.space import Thing, Wall
-from embodied.generate.furnish.stock import NO_LEAST_SIZE, NO_MOST_SIZE
 from embodied.generate.furnish.tables import FurnitureGroup, GroupPart
 
 LARGE_BASE = 2.0

@@ -19,7 +19,6 @@ from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import RecordError, from_plain, read_toml
 from embodied.assets.records import Size
 from embodied.generate.furnish.likes import LIKES
-from embodied.generate.furnish.style import Style
 from embodied.house.house import HouseError
 
 FILES = ("groups.toml", "rooms.toml", "smalls.toml")
@@ -333,6 +332,18 @@ class SmallObject:
     def __post_init__(self) -> None:
         _one_of("per", self.per, PER)
         _one_of("spot", self.spot, ("any", "back", "front", "side", "centre"))
+
+
+@dataclass(frozen=True)
+class Style:
+    """One house's style; words are matched against an asset's colours, materials, name and tags."""
+
+    favours: tuple[str, ...]
+    shuns: tuple[str, ...]
+    tidiness: float = 0.6
+    """0 is lived in, 1 is a show flat; scales how many small things lie about."""
+    warmth: float = 0.5
+    """Colour of its lamps: 0 neutral white, 1 warm white."""
 
 
 @dataclass(frozen=True)
