@@ -100,7 +100,6 @@ def read_models(
     """The assets of catalogue rows by key over the classes they name, and how to import each that is not built.
 
     Args:
-      where: name of the file, for error messages.
       licences: by pack, for models that do not state their own.
     """
     assets, recipes = {}, {}

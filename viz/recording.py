@@ -104,15 +104,9 @@ def record(
     Args:
       recording: where to log; the caller has connected it to a file or a viewer.
       world: the world of the task; its panoramas are drawn when a step needs them.
-      task: what is being played.
-      steps: the steps of one episode as they happen.
       eyes: the world whose panoramas the agent looks at; None for an agent that looks at none.
-      pictures: sizes of the pictures.
       budget: requests that the episode allowed; None where they were not counted.
       recognise: names what the agent recognises in a panorama of `eyes`.
-
-    Yields:
-      The same steps.
     """
     log_world(recording, world)
     log_task(recording, world, task)

@@ -69,9 +69,7 @@ def open_recording(
     """A recording stream connected to `sinks`, flushed and closed at the end.
 
     Args:
-      sinks: where it goes.
       blueprint: the layout a viewer shows it with.
-      name: what the viewer calls it.
       properties: fingerprint of renderer, device and versions, kept inside the recording.
 
     Raises:

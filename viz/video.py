@@ -80,15 +80,12 @@ def film_episode(
     size: tuple[int, int],
     watch: Callable[[list[tuple[str, np.ndarray]]], Iterable[tuple[str, np.ndarray]]] = iter,
 ) -> int:
-    """Film what the agent saw, with smooth motion and, below, the request and what the assistant says.
+    """Film what the agent saw, with smooth motion and, below, the request and the assistant's words; the number of frames.
 
     Args:
       draw: the picture of frame number i, from its camera x, y, z, yaw, pitch: (height, width, 3) uint8.
       size: height and width, both even.
       watch: wraps the frames (a progress bar).
-
-    Returns:
-      The number of frames.
     """
     spoken = [s.reply is not None for s in episode.steps]
     track = camera_track(
@@ -131,15 +128,11 @@ def captioned(rgb: np.ndarray, caption: str) -> np.ndarray:
 
 
 def write_video(path: Path, frames: Iterator[np.ndarray], size: tuple[int, int]) -> int:
-    """Encode RGB frames as H.264 in an .mp4 that appears complete or not at all.
+    """Encode RGB frames as H.264 in an .mp4 that appears complete or not at all; their number.
 
     Args:
-      path: where to write.
       frames: (height, width, 3) uint8 each.
       size: height and width, both even.
-
-    Returns:
-      The number of frames.
     """
     if size[0] % 2 or size[1] % 2:
         raise ValueError(f"a video needs an even height and width, got {size}")

@@ -34,9 +34,6 @@ BUILT_FIELDS = {"class", "build", "after", "set", "look"} | (rows.ASSET_FIELDS -
 def read_built_assets(where: str, table: Row) -> Mapping[str, ParametricAsset]:
     """The assets of a table {"sets": {...}, "groups": [...]} by key 'built/<name>', keys sorted.
 
-    Args:
-      where: name of the file, for error messages.
-
     Raises:
       RecordError: a field that is unknown or holds what it should not, a key twice.
     """
@@ -57,7 +54,6 @@ def remade(where: str, table: Mapping[str, Row], assets: Mapping[str, Asset]) ->
     Such a thing keeps its key, words, size and surfaces, so that houses stay as they are; its mesh is built.
 
     Args:
-      where: name of the file, for error messages.
       assets: of these rows.
 
     Raises:

@@ -74,9 +74,6 @@ class Material:
 def read_materials(where: str, table: Row) -> Mapping[str, Material]:
     """The materials of a table {"groups": [...]} by key, keys sorted.
 
-    Args:
-      where: name of the file, for error messages.
-
     Raises:
       RecordError: a field that is unknown, missing, or holds what it should not; a key twice.
     """

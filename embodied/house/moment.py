@@ -204,11 +204,7 @@ def carried(root: Placement, pose: RigidPose, p: Placement) -> RigidPose:
 
 
 def apart(mesh: Callable[..., tuple[MeshPart, ...]], p: Placement) -> TakenApart | None:
-    """A placement, closed, with its moving parts apart; None where nothing of it moves.
-
-    Args:
-      mesh: Catalogue.mesh.
-    """
+    """A placement, closed, with its moving parts apart; None where nothing of it moves. `mesh`: Catalogue.mesh."""
     return taken_apart(p.object_class, mesh(p.asset, p.size, closed(p.params)))
 
 

@@ -137,11 +137,7 @@ def device() -> str:
 
 
 def scene_of(corners: np.ndarray) -> RayScene:
-    """A scene of bare triangles, for ray tests only.
-
-    Args:
-      corners: (m, 3, 3) metres; triangle i is primitive i.
-    """
+    """A scene of bare triangles, for ray tests only. `corners`: (m, 3, 3) metres; triangle i is primitive i."""
     m = len(corners)
     mesh = mi.Mesh("triangles", 3 * m, m)
     params = mi.traverse(mesh)

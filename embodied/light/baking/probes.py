@@ -49,11 +49,7 @@ AROUND_RAYS = 1024
 
 
 def probes_of(s: LightSolution, settings: LightSettings, memory: LightingCache | None = None) -> Probes:
-    """Probes of a lit house.
-
-    Args:
-      memory: keeps what does not depend on sky and lamps.
-    """
+    """Probes of a lit house. `memory`: keeps what does not depend on sky and lamps."""
     inputs = BakeInput(s.house, s.atlas, s.lux, s.space, s.outdoors, s.lamps, settings, None, s.without)
     own: LightingCache | None = None if memory is None else get_or_compute(memory, "probes", dict)
     probes = get_or_compute(own, "grids", lambda: seeing(grids(s.house), s.space.scene))

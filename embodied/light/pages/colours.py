@@ -83,11 +83,7 @@ class Paints:
 
 
 def paints_of(page: Page, scale: float, read: ColourMaps) -> Paints:
-    """Upload the colours of a page.
-
-    Args:
-      scale: texels per luxel; maps are halved until they are no finer.
-    """
+    """Upload the colours of a page. `scale`: texels per luxel; maps are halved until they are no finer."""
     plain = linear(np.array([f.color[:3] for f in page.finishes], np.float32).reshape(-1, 3))[page.finish]
     first, width, height = (np.zeros(len(page.finish), np.uint32) for _ in range(3))
     maps, end = [np.zeros(1, np.uint32)], 1

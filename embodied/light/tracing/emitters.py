@@ -187,11 +187,7 @@ def write_lamps(path: Path, lamps: Sequence[Lamp]) -> None:
 
 
 def read_lamps(path: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Lamp, ...]:
-    """Lamps that `write_lamps` wrote.
-
-    Args:
-      rows: id, room and owner of each.
-    """
+    """Lamps that `write_lamps` wrote. `rows`: id, room and owner of each."""
     with open_arrays(path) as z:
         arrays = [{k: z[f"{k}{i}"] for k in LAMP_ARRAYS} for i in range(len(rows))]
     stored = zip(rows, arrays, strict=True)

@@ -66,11 +66,7 @@ class Points:
 def points_of(
     position: np.ndarray, normal: np.ndarray, face_normal: np.ndarray, thin: np.ndarray, turn: np.ndarray | None = None
 ) -> Points:
-    """Upload points; all arrays (n, 3) but `thin` (n,).
-
-    Args:
-      turn: (2, n) float32 in [0, 1), random by default.
-    """
+    """Upload points; all arrays (n, 3) but `thin` (n,). `turn`: (2, n) float32 in [0, 1), random by default."""
     turn = np.random.default_rng(0).random((2, len(position)), np.float32) if turn is None else turn
     p = Points(
         len(position),
@@ -128,11 +124,7 @@ class Space:
 
 
 def space_of(atlas: Atlas, luxels: Sequence[Texels]) -> Space:
-    """Upload the house, below a black sky.
-
-    Args:
-      luxels: what lies under each page at fineness 1.
-    """
+    """Upload the house, below a black sky. `luxels`: what lies under each page at fineness 1."""
     corners = np.concatenate([p.corners for p in atlas.pages])
     page = np.concatenate([np.full(len(p.corners), i) for i, p in enumerate(atlas.pages)])
     keep = np.nonzero(~np.array([p.glass for p in atlas.pages])[page])[0]
