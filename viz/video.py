@@ -80,7 +80,7 @@ def film_episode(
     size: tuple[int, int],
     watch: Callable[[list[tuple[str, np.ndarray]]], Iterable[tuple[str, np.ndarray]]] = iter,
 ) -> int:
-    """Film what the agent saw, with smooth motion and, below, the request and the assistant's words; the number of frames.
+    """Film what the agent saw, with smooth motion and, below, the request and the assistant's words; the frame count.
 
     Args:
       draw: the picture of frame number i, from its camera x, y, z, yaw, pitch: (height, width, 3) uint8.
