@@ -112,7 +112,9 @@ class _Openings:
     ) -> None:
         """An opening to the outdoors from `start` along a wall, metres."""
         jambs = _jambs(self.plan.cells[w.cell], w.axis, w.across, start, start + width)
-        self.free[w.cell, w.index] = _without(self.free[w.cell, w.index], start, start + width)
+        low, high = start - 0.25, start + width + 0.25  # a quarter of a metre on both sides
+        cut = ((a, b, p, q) for a, b in self.free[w.cell, w.index] for p, q in ((a, low), (high, b)))
+        self.free[w.cell, w.index] = [(max(a, p), min(b, q)) for a, b, p, q in cut if min(b, q) > max(a, p)]
         self.add(kind, (self.names[w.cell], None), jambs, sill, head, hinge)
         if kind in ("front_door", "back_door"):
             self.swings.append(_swing(w.axis, w.across, start, start + width, -w.side))
@@ -345,12 +347,6 @@ def _folded_door(made: _Openings, link: Link, rng: np.random.Generator) -> bool:
     ends = (made.names[link.parent], made.names[link.child])
     made.add("door", ends, jambs, 0.0, 2.05, _hinge(jambs, at_low), open_by)
     return True
-
-
-def _without(free: list[tuple[float, float]], low: float, high: float) -> list[tuple[float, float]]:
-    """`free` intervals without (low, high) and a quarter of a metre on both sides."""
-    low, high = low - 0.25, high + 0.25
-    return [(max(a, p), min(b, q)) for a, b in free for p, q in ((a, low), (high, b)) if min(b, q) > max(a, p)]
 
 
 def _front_door(made: _Openings, rng: np.random.Generator) -> None:

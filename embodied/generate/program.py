@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from embodied.generate.config import HouseConfig
-from embodied.generate.kinds import BEDROOMS, ROOM_TABLE, Extra
+from embodied.generate.kinds import BEDROOMS, ROOM_TABLE
 
+FURTHER = {name: kind.extra for name, kind in ROOM_TABLE.items() if kind.extra is not None}
 DOUBLE_KINDS = ("study", "family_room", "workshop", "playroom", "sun_room", "library")
 """Kinds with an `extra` of which large houses may have two."""
 
@@ -98,9 +99,8 @@ def _sleeping(count: int, area: float, rng: np.random.Generator) -> list[WantedR
 
 def _extras(spaces: list[WantedRoom], area: float, config: HouseConfig, rng: np.random.Generator) -> list[WantedRoom]:
     """`spaces` and further rooms until the area is used (or the asked number of main rooms is there)."""
-    extras = _extra_kinds()
     asked, grow = config.rooms is not None, float(np.clip((area - 150) / 450, 0, 1))
-    left = list(extras)
+    left = list(FURTHER)
     while True:
         if config.rooms is not None and sum(ROOM_TABLE[s.kind].is_main for s in spaces) >= config.rooms:
             return spaces
@@ -110,12 +110,12 @@ def _extras(spaces: list[WantedRoom], area: float, config: HouseConfig, rng: np.
         fits = [
             k
             for k in left
-            if (asked or area >= extras[k].house) and (extras[k].size * 0.8 <= free or (asked and k != "garage"))
+            if (asked or area >= FURTHER[k].house) and (FURTHER[k].size * 0.8 <= free or (asked and k != "garage"))
         ]
         if fits:
-            p = np.array([extras[k].likely for k in fits])
+            p = np.array([FURTHER[k].likely for k in fits])
             kind = str(rng.choice(fits, p=p / p.sum()))
-            size = extras[kind].size * (1 + 0.35 * grow)
+            size = FURTHER[kind].size * (1 + 0.35 * grow)
             if kind == "garage" and area > 220 and rng.random() < 0.6:
                 size = 33.0
             spaces.append(WantedRoom(kind, size))
@@ -129,26 +129,22 @@ def _extras(spaces: list[WantedRoom], area: float, config: HouseConfig, rng: np.
         spaces.append(another)
 
 
-def _extra_kinds() -> dict[str, Extra]:
-    return {name: kind.extra for name, kind in ROOM_TABLE.items() if kind.extra is not None}
-
-
 def _another(
     spaces: list[WantedRoom], area: float, config: HouseConfig, grow: float, rng: np.random.Generator
 ) -> WantedRoom | None:
     """One more bedroom, or a second study or the like; None where the house has enough of them."""
-    extras, asked = _extra_kinds(), config.rooms is not None
+    asked = config.rooms is not None
     beds = sum(s.kind in BEDROOMS for s in spaces)
     most = 0.5 * config.rooms if config.rooms is not None else area / 62
     seconds = [
-        k for k in DOUBLE_KINDS if sum(s.kind == k for s in spaces) < 2 and (asked or area > 2 * extras[k].house)
+        k for k in DOUBLE_KINDS if sum(s.kind == k for s in spaces) < 2 and (asked or area > 2 * FURTHER[k].house)
     ]
     if (beds < most and config.bedrooms is None) or (not seconds and asked):
         return WantedRoom("guest_room" if rng.random() < 0.5 else "bedroom", 11.0 + 3.0 * grow)
     if not seconds:
         return None
     kind = str(rng.choice(seconds))
-    return WantedRoom(kind, extras[kind].size * (1 + 0.35 * grow))
+    return WantedRoom(kind, FURTHER[kind].size * (1 + 0.35 * grow))
 
 
 def scaled(spaces: list[WantedRoom], total: float) -> tuple[WantedRoom, ...]:
