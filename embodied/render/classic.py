@@ -220,20 +220,14 @@ class Renderer:
     def panorama(self, position: Sequence[float] | np.ndarray, size: int | None = None) -> Panorama:
         """Six cube faces of rgb, depth and ids around `position` (x, y, z)."""
         s = size or self.size
-        rgb = np.empty((6, s, s, 3), np.uint8)
-        depth, ids = np.empty((6, s, s), np.float32), np.empty((6, s, s), np.int32)
-        for k, camera in enumerate(face_cameras(position)):
-            rgb[k] = self.rgb(camera, (s, s))
-            depth[k], ids[k] = self.depth_and_ids(camera, (s, s))
-        return Panorama(rgb, depth, ids)
+        rgb = np.stack([self.rgb(camera, (s, s)) for camera in face_cameras(position)])
+        return Panorama(rgb, *self.seen(position, s))
 
     @gl.drawing()
     def seen(self, position: Sequence[float] | np.ndarray, size: int = 64) -> tuple[np.ndarray, np.ndarray]:
         """Depth and ids of the six faces without the colours: (6, s, s) float32 metres, (6, s, s) int32."""
-        depth, ids = np.empty((6, size, size), np.float32), np.empty((6, size, size), np.int32)
-        for k, camera in enumerate(face_cameras(position)):
-            depth[k], ids[k] = self.depth_and_ids(camera, (size, size))
-        return depth, ids
+        faces = [self.depth_and_ids(camera, (size, size)) for camera in face_cameras(position)]
+        return np.stack([depth for depth, _ in faces]), np.stack([ids for _, ids in faces])
 
     def close(self) -> None:
         """Free what lies on the graphics side; the renderer cannot be used afterwards."""
