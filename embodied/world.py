@@ -555,7 +555,7 @@ class World:
 
     @functools.cached_property
     def _sightings(self) -> SightingTable:
-        code = code_digest(*makers(Unlit()), "embodied.render.ray_casting", "embodied.render.sightings")
+        code = code_digest(*makers(Unlit()), "embodied.render.sightings")
         path = self.cache / "sightings" / f"{digest(self._origin, code)[:32]}.npz"
         table = load_record(SightingTable, path)
         if table is None:
@@ -567,7 +567,7 @@ class World:
         """Depth and ids of the cube faces of FACE pixels around every node."""
         positions = self.graph.positions
         if not gl.available():
-            from embodied.render.ray_casting import RayCaster  # late: compiles the house
+            from embodied.render.geoms import RayCaster  # late: compiles the house
 
             log.warning("no OpenGL here: rays find what is seen in %s, a second a viewpoint", self.name)
             caster = RayCaster(self.house, self.catalogue)

@@ -13,9 +13,8 @@ from conftest import two_rooms
 from handmade import HandCatalogue
 
 from embodied.errors import UnableError
-from embodied.scene.glb import export_glb
+from embodied.scene.glb import export_glb, export_usd
 from embodied.scene.lit_pages import LitMesh, LitPages
-from embodied.scene.usd import export_usd
 
 
 def lit_pages() -> LitPages:

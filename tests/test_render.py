@@ -17,6 +17,7 @@ from embodied.light.settings import QUALITIES
 from embodied.render import visibility
 from embodied.render.camera import face_cameras
 from embodied.render.classic import Renderer
+from embodied.render.geoms import RayCaster
 from embodied.render.pictures import (
     BAKED_QUALITIES,
     WORDS_FOR_PICTURES,
@@ -29,7 +30,6 @@ from embodied.render.pictures import (
     parse_pictures,
     recorded,
 )
-from embodied.render.ray_casting import RayCaster
 from embodied.render.supersampling import averaged, drawn_size, nearest, step_of
 from embodied.scene.house_meshes import owners
 

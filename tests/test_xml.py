@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from embodied.agents.bandit.corpus import _blocks
+from embodied.scene.glb import prim_name
 from embodied.scene.robots import _loaded
-from embodied.scene.usd import prim_name
 
 ROOT = Path(__file__).parents[1]
 PARSERS = re.compile(

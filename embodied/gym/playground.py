@@ -213,7 +213,7 @@ def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> Picture
 def seen_features(world: SeenPlace, catalogue: Catalogue, cache: Path) -> np.ndarray:
     """The semantic features of a world over all classes of the catalogue, kept in the cache."""
     classes = tuple(catalogue.classes)
-    others = ("embodied.render.ray_casting", "embodied.render.sightings", "embodied.gym.semantic_features")
+    others = ("embodied.render.sightings", "embodied.gym.semantic_features")
     code = code_digest(*makers(Unlit()), *others)
     key = digest(world.house.digest, np.asarray(world.graph.positions).tolist(), classes, code)
     path = cache / "semantic" / f"{key[:32]}.npy"

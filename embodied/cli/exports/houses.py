@@ -87,7 +87,7 @@ def run_mjcf(args: MjcfOptions) -> None:
 
 
 def run_usd(args: UsdOptions) -> None:
-    from embodied.scene.usd import check_usd, export_usd
+    from embodied.scene.glb import check_usd, export_usd
 
     check_usd(args.out)
     house, _, lit = lit_house(args)
