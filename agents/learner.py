@@ -42,6 +42,8 @@ class PlaySettings:
     """One of embodied.agents.vision.config.GOAL_IMAGES."""
     cache: Path = field(default_factory=default_cache)
     seed: int = 0
+    rules: str | None = None
+    """Of play, as `--rules` names them; VNLA's rows have their own."""
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     source, agent = evaluation_data(data, how), HannaAgent.load(file)
 
     def of_split(split: str) -> Players:
-        whole, policies = data.split(split), players(agent, source.split(split).bank)
+        whole, policies = data.split(split, rules=how.rules), players(agent, source.split(split).bank)
         return Players({name: (whole, policy) for name, policy in policies.items()}, WITHOUT_LEARNING)
 
     return of_split

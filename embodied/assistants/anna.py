@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.interface import Intention, Pose, Reply, Route, Situation, Subtask, Viewpoint
+from embodied.assets.catalogue import load_catalogue
+from embodied.house.shapes import room_at
+from embodied.interface import Intention, Place, Pose, Reply, Route, Situation, Subtask, Viewpoint
+from embodied.people.day import Day, day_of
+from embodied.seeds import stream
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
@@ -15,6 +21,8 @@ if TYPE_CHECKING:
 ATTENTION = 2.0
 """epsilon_attn, metres (Table D.1)."""
 TIE = 1e-6
+HOURS = 7.0, 22.0
+"""Of the day, between which tasks begin where people live."""
 
 
 class AssistantError(ValueError):
@@ -47,8 +55,12 @@ class Anna:
 
     def intentions(self, situation: Situation) -> tuple[Intention, ...]:
         """Help, inside a zone of attention; it depends on the place only, never on the goal."""
+        return (Intention.HELP,) if len(self.known(situation)) else ()
+
+    def known(self, situation: Situation) -> np.ndarray:
+        """Numbers of the routes that somebody at hand can tell."""
         home = self._homes.get(situation.task.world)
-        return (Intention.HELP,) if home and len(home.enterable[situation.pose.node]) else ()
+        return home.enterable[situation.pose.node] if home else np.zeros(0, np.int64)
 
     def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
         """The route xi* (4.4), the departure node (4.6) and the goal node g* (4.7).
@@ -60,15 +72,55 @@ class Anna:
           AssistantError: asked outside every zone.
         """
         name, node, goals = situation.task.world, situation.pose.node, situation.task.goal_nodes
-        home = self._homes.get(name)
-        if home is None or not len(home.enterable[node]):
+        known = tuple(self.known(situation).tolist())
+        if not known:
             raise AssistantError(f"nobody pays attention at node {node} of {name!r}; ask where can_ask is not empty")
-        best = home.best(node, goals)
+        home = self._homes[name]
+        best = home.best(known, goals)
         route = best[int(rng.integers(len(best)))] if len(best) > 1 else best[0]
         depart, goal = home.departure(route.path, goals)
         start, path = Pose(route.path[0], route.turn, route.tilt), route.path[: route.path.index(depart) + 1]
         subtask = Subtask(route.id, depart, start=start, goal=goal, path=path)
         return Reply(text=route.instruction, image=Viewpoint(name, depart), subtask=subtask)
+
+
+class Residents(Anna):
+    """ANNA's people where their day has them: routes are told in the rooms that somebody who is awake is in.
+
+    A task begins at an hour between HOURS, drawn for it; a step takes a minute of the day.
+    """
+
+    def __init__(
+        self, places: Mapping[str, Place], routes: Mapping[str, Sequence[Route]], *, split: str = "train_seen"
+    ) -> None:
+        """As `Anna`, with the houses."""
+        super().__init__({name: p.graph for name, p in places.items()}, routes, split=split)
+        self._places, self._catalogue = places, functools.cache(load_catalogue)
+        self._day = functools.cache(self._lived)
+        self._manned = functools.lru_cache(4096)(self._rooms)
+
+    def known(self, situation: Situation) -> np.ndarray:
+        near = super().known(situation)
+        if not len(near):
+            return near
+        name, rooms = situation.task.world, self._homes[situation.task.world].rooms[near]
+        return near[np.isin(rooms, self._manned(name, minute_of(situation.task.id) + situation.time))]
+
+    def _lived(self, name: str) -> Day:
+        house = self._places[name].house
+        alive = tuple(p for p in house.placements if p.object_class != "person")  # figures stand for the same people
+        return day_of(dataclasses.replace(house, placements=alive), self._catalogue(), seed=0)
+
+    def _rooms(self, name: str, minute: int) -> list[str | None]:
+        day, time = self._day(name), minute / 60
+        asleep = [n for n, p in day.now(time).items() if p.spot.activity == "sleeping" and p.leg is None]
+        at = {n: np.add(p.place.position, (0, 0, 0.5)) for n, p in day.at(time).people.items()}
+        return [room_at(day.house, place) for n, place in at.items() if n not in asleep]
+
+
+def minute_of(task: str) -> int:
+    """The minute of the day at which a task begins, by its id."""
+    return int(stream(0, "hour", task).uniform(*HOURS) * 60)
 
 
 class _Home:
@@ -93,13 +145,14 @@ class _Home:
         for v in range(len(distance)):
             near = [u for u in sorted(int(u) for u in graph.neighbours(v)) if distance[v, u] <= ATTENTION + 1e-9]
             self.enterable.append(np.array([i for u in (v, *near) for i in starting.get(u, [])], dtype=np.int64))
-        self._best: dict[tuple[int, tuple[int, ...]], tuple[Route, ...]] = {}
+        self.rooms = np.array([graph.room_of_node[r.path[0]] for r in routes])
+        self._best: dict[tuple[tuple[int, ...], tuple[int, ...]], tuple[Route, ...]] = {}
 
-    def best(self, node: int, goals: tuple[int, ...]) -> tuple[Route, ...]:
-        """Routes of the zone that come nearest to a goal (4.4, 4.5), in the wordings of the split."""
-        key = (node, goals)
+    def best(self, known: tuple[int, ...], goals: tuple[int, ...]) -> tuple[Route, ...]:
+        """The known routes that come nearest to a goal (4.4, 4.5), in the wordings of the split."""
+        key = (known, goals)
         if key not in self._best:
-            here = self.enterable[node]
+            here = np.array(known)
             nearest = self.closest[np.ix_(here, np.array(goals))].min(axis=1)  # Eq 4.5
             winners = here[nearest <= nearest.min() + TIE]  # Eq 4.4
             self._best[key] = tuple(self.routes[i] for i in winners if self.routes[i].split == self.split)

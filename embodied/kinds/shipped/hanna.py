@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 
 import numpy as np
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.assistants.anna import Anna
+from embodied.assistants.anna import Anna, Residents
 from embodied.envs.base import HelpEnv, required
-from embodied.interface import Ask, Episode, Mode, Move, Place, Reply, Stop, Viewpoint
+from embodied.interface import Ask, Episode, Mode, Move, Observation, Place, Reply, Stop, Viewpoint
 from embodied.kinds import task_kind
 from embodied.kinds.splits import five_splits
 from embodied.navigation.graph import NavGraph
@@ -22,7 +23,8 @@ TABLE_4_2 = {"train": 51, "val": 7, "test": 10}, five_splits(82_484, 5_001, 5_01
 NEAR_ENOUGH = 2.0
 """Metres from the target of a sub-task within which it succeeded."""
 
-
+RULES = ("told", "shown", "living", "living-shown")
+"""People tell the way, or walk it ahead, too; people stand where routes begin, or are where their day has them."""
 LIMITS = FindConfig("hanna", reach=2.5, fewest_nodes=5, most_nodes=15, radius=2.0, horizon=50)
 """Limits of 4.2.5 and Table D.1; training takes 20 steps. An instance counts when a node of its room is within reach;
 that node is its goal."""
@@ -45,7 +47,29 @@ def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.Par
 
 
 class HannaEnv(HelpEnv):
-    """Algorithm 7 of dissertation 4.2.2: two modes, people who know routes, images of where to go."""
+    """Algorithm 7 of dissertation 4.2.2: two modes, people who know routes, images of where to go.
+
+    Who shows the way walks ahead, always one viewpoint of it, while they tell it. The agent follows them by a rule:
+    other moves are masked, and where they end the sub-task ends. It may leave before, by stopping or asking.
+    """
+
+    shows = False
+
+    def _look(self) -> Observation:
+        observation = super()._look()
+        path = self.subtask.path if self.subtask is not None else ()
+        if not self.shows or self.pose.node not in path[:-1]:
+            return observation
+        candidates, ahead = observation.candidates, path[path.index(self.pose.node) + 1]
+        allowed = candidates.allowed & (np.array(self.situation.candidate_nodes) == ahead)
+        candidates = dataclasses.replace(candidates, allowed=allowed)
+        self.situation = dataclasses.replace(self.situation, candidates=candidates)
+        self.observation = dataclasses.replace(observation, candidates=candidates)
+        return self.observation
+
+    def _moved(self) -> None:
+        if self.shows and self.subtask is not None and self.pose.node == self.subtask.target:
+            self._stopped()
 
     def _replied(self, reply: Reply) -> None:
         subtask = required(reply.subtask, "sub-task in the reply")
@@ -55,6 +79,7 @@ class HannaEnv(HelpEnv):
         self.subtask, self.targets = subtask, (subtask.target,)
         self.pose = subtask.start or self.pose  # line 13: step to the start of the route and look along it
         self.time_on_task = 0
+        self._moved()  # the way may end where it begins
 
     def _stopped(self) -> None:
         if self.mode is Mode.MAIN:  # lines 17-18
@@ -71,9 +96,22 @@ class HannaEnv(HelpEnv):
 def environments(inputs: task_kind.EnvInputs) -> task_kind.EnvMaker:
     worlds = inputs.worlds
     routes = {name: known for name in worlds if (known := inputs.routes(name))}
-    anna = inputs.assistant or Anna({name: w.graph for name, w in worlds.items()}, routes, split=inputs.wording)
+    if inputs.rules not in RULES:
+        raise ValueError(f"rules of HANNA should be one of {RULES}, got {inputs.rules!r}")
+    if inputs.assistant is not None:
+        anna = inputs.assistant
+    elif inputs.rules.startswith("living"):
+        anna = Residents(worlds, routes, split=inputs.wording)
+    else:
+        anna = Anna({name: w.graph for name, w in worlds.items()}, routes, split=inputs.wording)
     moves = PanoramicMoves()
-    return lambda: HannaEnv(worlds, anna, moves)
+
+    def env() -> HannaEnv:
+        out = HannaEnv(worlds, anna, moves)
+        out.shows = inputs.rules.endswith("shown")
+        return out
+
+    return env
 
 
 def subtask_success(episode: Episode, graph: NavGraph) -> float:
@@ -85,7 +123,7 @@ def subtask_success(episode: Episode, graph: NavGraph) -> float:
     for i, step in enumerate(episode.steps):
         if step.mode is not Mode.SUB:
             continue
-        last = i + 1 == len(episode.steps)
+        last = i + 1 == len(episode.steps) or episode.steps[i + 1].mode is Mode.MAIN
         if isinstance(step.action, (Ask, Stop)) or last:
             node = step.next_pose.node if isinstance(step.action, Move) else step.pose.node
             outcomes.append(graph.distance[node, step.targets[0]] <= NEAR_ENOUGH + 1e-9)
@@ -98,6 +136,7 @@ HANNA = task_kind.register_kind(
         title="HANNA",
         tasks=tasks,
         environment=environments,
+        rules=RULES[0],
         help="words",
         baselines={
             **task_kind.PLAIN_AGENTS,  # in the next three the teacher navigates: they show what asking so costs
