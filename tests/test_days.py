@@ -10,11 +10,14 @@ import shapely
 
 from embodied.assets.cache import default_cache
 from embodied.assets.catalogue import load_catalogue
+from embodied.assistants.anna import Anna, Residents, minute_of
+from embodied.datasets.store import StoredPlace
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.moment import Moment
 from embodied.house.shapes import inward
+from embodied.interface import FindObject, Mode, Pose, Route, Situation, Task
 from embodied.navigation.free_space import free_floor, leaves
-from embodied.navigation.graph import AGENT_RADIUS
+from embodied.navigation.graph import AGENT_RADIUS, build_graph
 from embodied.people.day import day_of, seconds_of
 
 SMALL, CATALOGUE = HouseConfig(area=(38, 46)), load_catalogue(default_cache())
@@ -75,6 +78,28 @@ def test_the_same_seed_gives_the_same_day_and_people_sleep_at_night_and_eat_at_h
     assert lying.pose.joints["pelvis"][0] < -1.5
     others = {s.activity for h in range(24) for s in spots(lives, h).values()}
     assert {"eating", "cooking", "washing", "out"} <= others
+
+
+def test_living_people_answer_where_they_are_awake_and_move_while_an_episode_goes_on():
+    house, lives = day(7)
+    graph = build_graph(house)
+    place, nodes = StoredPlace(house, graph), range(len(graph.positions))
+    routes = [Route(f"r{n}", (n, int(graph.neighbours(n)[0])), 0, 0, "go", "test") for n in nodes]
+    inputs = {house.name: place}, {house.name: routes}
+    everywhere, living = Anna({house.name: graph}, inputs[1], split="test"), Residents(*inputs, split="test")
+    manned = set()
+    for hour in (3.0, 7.8, 12.5, 18.6):
+        awake = {n for n, p in lives.now(hour).items() if p.spot.activity not in ("sleeping", "out")}
+        for node in nodes:
+            task = Task(f"t{hour}", "hanna", house.name, Pose(node), FindObject("mug"), (0,), "find a mug", 2.0, 50)
+            late = int(hour * 60) - minute_of(task.id)
+            situation = Situation(place, task, Pose(node), Mode.MAIN, (0,), None, (), None, late, 0)
+            assert len(everywhere.known(situation))
+            rooms = {graph.room_of_node[routes[k].path[0]] for k in living.known(situation)}
+            assert not rooms or awake
+            manned.update((hour, room) for room in rooms)
+    assert not any(hour == 3.0 for hour, _ in manned)
+    assert len({room for _, room in manned}) > 1 and {hour for hour, _ in manned} >= {7.8, 18.6}
 
 
 @pytest.mark.parametrize("time", ["25:00", "half past six", -1, float("nan"), "7:75"])

@@ -18,7 +18,8 @@ from embodied.envs.base import ActionError
 from embodied.evaluation.evaluate import play
 from embodied.interface import VIEWS, Ask, Intention, Mode, Move, Pose, Route, Step, Stop, Thought, Viewpoint, viewpoint
 from embodied.kinds import metrics
-from embodied.kinds.shipped.hanna import subtask_success
+from embodied.kinds.shipped.hanna import HANNA, ShowingEnv, subtask_success
+from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage, detokenized
 from embodied.navigation.graph import count_hops
 from embodied.policies.baselines import (
@@ -63,6 +64,24 @@ def test_the_departure_node_is_the_nearest_to_a_goal_not_the_end_of_the_route():
     env.reset(dataclasses.replace(LINE_TASK, goal_nodes=(2,)))
     reply = env.assistant.answer(env.situation, Intention.HELP, rng=stream(0))
     assert reply.subtask.target == 2 and reply.subtask.path == (1, 2)
+
+
+def test_who_is_shown_the_way_can_only_follow_and_is_back_at_the_main_task_where_it_ends():
+    told = line_env((Route("long", (1, 2, 3), 3, 1, "go two", "test"),))
+    env = ShowingEnv(told.worlds, told.assistant)
+    env.reset(LINE_TASK)
+    env.step(Ask())
+    for node in (2, 3):
+        assert env.mode is Mode.SUB and env.instruction == "go two"
+        (only,) = np.flatnonzero(env.observation.candidates.allowed)
+        env.step(Move(int(only)))
+        assert env.pose.node == node
+    assert env.mode is Mode.MAIN and env.subtask is None and env.observation.candidates.allowed.any()
+    env.step(Stop())
+    assert metrics.success(env.episode(), env.world.graph) == 1.0
+    assert subtask_success(env.episode(), env.world.graph) == 1.0
+    with pytest.raises(ValueError, match="living"):
+        HANNA.environments(EnvInputs(told.worlds, rules="alive"))
 
 
 def test_every_path_needs_a_wording_in_the_split():

@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import shapely
@@ -23,7 +23,7 @@ from embodied.assets.people import POSES, Person, Pose, people
 from embodied.generate.household import household_of
 from embodied.geometry import facing_of, rotation, yaw_facing
 from embodied.house.house import House, Placement
-from embodied.house.moment import WIDEST, Moment, MovingPerson, RigidPose
+from embodied.house.moment import WIDEST, Moment, MovingPerson, RigidPose, Triple
 from embodied.house.shapes import footprint, inward
 from embodied.navigation.floor_ways import FloorWays
 from embodied.navigation.free_space import HEAD, LOW, closed_doors, leaves, opened
@@ -39,7 +39,6 @@ SETTLING, POSE_SECONDS = (0.0, 1.8, 4.4), 1.0
 """Seconds to stand, sit down and lie down, and to take up what one does."""
 SPOT_REACH, LYING_BACK = 1.0, 0.11
 """Metres up to which one stands from where one sits or works, and of the pelvis above what one lies on."""
-Triple: TypeAlias = tuple[float, float, float]
 LEGS = ("pelvis", "thigh", "shin", "foot", "toes")
 """Ends of the names of joints that activities leave alone."""
 TABLES: Any = read_toml(Path(__file__).with_name("day.toml"))

@@ -47,29 +47,7 @@ def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.Par
 
 
 class HannaEnv(HelpEnv):
-    """Algorithm 7 of dissertation 4.2.2: two modes, people who know routes, images of where to go.
-
-    Who shows the way walks ahead, always one viewpoint of it, while they tell it. The agent follows them by a rule:
-    other moves are masked, and where they end the sub-task ends. It may leave before, by stopping or asking.
-    """
-
-    shows = False
-
-    def _look(self) -> Observation:
-        observation = super()._look()
-        path = self.subtask.path if self.subtask is not None else ()
-        if not self.shows or self.pose.node not in path[:-1]:
-            return observation
-        candidates, ahead = observation.candidates, path[path.index(self.pose.node) + 1]
-        allowed = candidates.allowed & (np.array(self.situation.candidate_nodes) == ahead)
-        candidates = dataclasses.replace(candidates, allowed=allowed)
-        self.situation = dataclasses.replace(self.situation, candidates=candidates)
-        self.observation = dataclasses.replace(observation, candidates=candidates)
-        return self.observation
-
-    def _moved(self) -> None:
-        if self.shows and self.subtask is not None and self.pose.node == self.subtask.target:
-            self._stopped()
+    """Algorithm 7 of dissertation 4.2.2: two modes, people who know routes, images of where to go."""
 
     def _replied(self, reply: Reply) -> None:
         subtask = required(reply.subtask, "sub-task in the reply")
@@ -79,7 +57,6 @@ class HannaEnv(HelpEnv):
         self.subtask, self.targets = subtask, (subtask.target,)
         self.pose = subtask.start or self.pose  # line 13: step to the start of the route and look along it
         self.time_on_task = 0
-        self._moved()  # the way may end where it begins
 
     def _stopped(self) -> None:
         if self.mode is Mode.MAIN:  # lines 17-18
@@ -93,25 +70,42 @@ class HannaEnv(HelpEnv):
         self.time_on_task = 0
 
 
+class ShowingEnv(HannaEnv):
+    """Who tells the way walks it, too, one viewpoint ahead. The agent follows by a rule: other moves are masked, and
+    where they end the sub-task ends. It may leave before, by stopping or asking."""
+
+    def _look(self) -> Observation:
+        observation, path = super()._look(), self.subtask.path if self.subtask is not None else ()
+        if self.pose.node not in path[:-1]:
+            return observation
+        candidates, ahead = observation.candidates, path[path.index(self.pose.node) + 1]
+        allowed = candidates.allowed & (np.array(self.situation.candidate_nodes) == ahead)
+        candidates = dataclasses.replace(candidates, allowed=allowed)
+        self.situation = dataclasses.replace(self.situation, candidates=candidates)
+        self.observation = dataclasses.replace(observation, candidates=candidates)
+        return self.observation
+
+    def _moved(self) -> None:
+        if self.subtask is not None and self.pose.node == self.subtask.target:
+            self._stopped()
+
+    def _replied(self, reply: Reply) -> None:
+        super()._replied(reply)
+        self._moved()  # the way may end where it begins
+
+
 def environments(inputs: task_kind.EnvInputs) -> task_kind.EnvMaker:
     worlds = inputs.worlds
     routes = {name: known for name in worlds if (known := inputs.routes(name))}
     if inputs.rules not in RULES:
         raise ValueError(f"rules of HANNA should be one of {RULES}, got {inputs.rules!r}")
-    if inputs.assistant is not None:
-        anna = inputs.assistant
-    elif inputs.rules.startswith("living"):
-        anna = Residents(worlds, routes, split=inputs.wording)
+    split = inputs.wording
+    if inputs.rules.startswith("living"):
+        anna: Anna = Residents(worlds, routes, split=split)
     else:
-        anna = Anna({name: w.graph for name, w in worlds.items()}, routes, split=inputs.wording)
-    moves = PanoramicMoves()
-
-    def env() -> HannaEnv:
-        out = HannaEnv(worlds, anna, moves)
-        out.shows = inputs.rules.endswith("shown")
-        return out
-
-    return env
+        anna = Anna({name: w.graph for name, w in worlds.items()}, routes, split=split)
+    moves, rule = PanoramicMoves(), ShowingEnv if inputs.rules.endswith("shown") else HannaEnv
+    return lambda: rule(worlds, inputs.assistant or anna, moves)
 
 
 def subtask_success(episode: Episode, graph: NavGraph) -> float:
