@@ -90,11 +90,9 @@ class Residents(Anna):
     A task begins at an hour between HOURS, drawn for it; a step takes a minute of the day.
     """
 
-    def __init__(
-        self, places: Mapping[str, Place], routes: Mapping[str, Sequence[Route]], *, split: str = "train_seen"
-    ) -> None:
+    def __init__(self, places: Mapping[str, Place], routes: Mapping[str, Sequence[Route]], **split: str) -> None:
         """As `Anna`, with the houses."""
-        super().__init__({name: p.graph for name, p in places.items()}, routes, split=split)
+        super().__init__({name: p.graph for name, p in places.items()}, routes, **split)
         self._places, self._catalogue = places, functools.cache(load_catalogue)
         self._day = functools.cache(self._lived)
         self._manned = functools.lru_cache(4096)(self._rooms)
@@ -113,9 +111,9 @@ class Residents(Anna):
 
     def _rooms(self, name: str, minute: int) -> list[str | None]:
         day, time = self._day(name), minute / 60
-        asleep = [n for n, p in day.now(time).items() if p.spot.activity == "sleeping" and p.leg is None]
-        at = {n: np.add(p.place.position, (0, 0, 0.5)) for n, p in day.at(time).people.items()}
-        return [room_at(day.house, place) for n, place in at.items() if n not in asleep]
+        awake = {n for n, p in day.now(time).items() if p.leg or p.spot.activity != "sleeping"}
+        at = (p.place.position for n, p in day.at(time).people.items() if n in awake)
+        return [room_at(day.house, np.add(place, (0, 0, 0.5))) for place in at]
 
 
 def minute_of(task: str) -> int:

@@ -2,16 +2,18 @@
 
 Generates a furnished house with people in it, lights it and renders the panorama of every viewpoint. Then one agent
 looks for an object along the shortest path, and a trained agent that has never seen this house finds another one by
-asking the people. Both episodes are recorded for Rerun; --video also films the second. At last a door closes and opens,
-filmed as DIR/door.mp4.
+asking the people. Both episodes are recorded for Rerun; --video also films the second. At last somebody who lives there
+walks and sits down, filmed as DIR/walk.mp4.
 """
 
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -29,8 +31,8 @@ if TYPE_CHECKING:
     from embodied.viz.sinks import Sinks
     from embodied.world import World
 
-DOOR_FRAMES, DOOR_SIZE, DOOR_FROM = 36, (360, 480), (1.5, 4.0)
-"""Frames of the video of a door, their height and width in pixels, and metres from which the door is filmed."""
+WALK_SECONDS, WALK_SIZE = 10.0, (240, 320)
+"""Of the walk that is filmed, about, and height and width of its frames, pixels."""
 SEED = 3
 """The demo house: a flat that is lit and drawn in a few minutes on two cores."""
 
@@ -81,12 +83,12 @@ def run(args: DemoOptions) -> None:
             walk = find_something(args, world)
         with timed("the second task: ask for help", seconds):
             help_facts = ask_for_help(args, world, routes)
-        with timed("a door closes and opens", seconds):
-            door = film_a_door(args.out / "door.mp4", world)
+        with timed("somebody walks", seconds):
+            mp4 = film_a_walk(args.out / "walk.mp4", world)
         facts: dict[str, object] = {"walk": walk, "help": help_facts, "plan": str(args.out / "plan.png")}
         facts |= {"seconds": seconds, "renderer": world.fingerprint["renderer"]}
     look = f"look at a recording with: rerun {help_facts['recording']}"
-    lines = [told(walk), told(help_facts), f"floor plan  {facts['plan']}", *([f"a door  {door}"] if door else []), look]
+    lines = [told(walk), told(help_facts), f"floor plan  {facts['plan']}", *([f"a walk  {mp4}"] if mp4 else []), look]
     show(args, facts, "\n".join(lines))
 
 
@@ -182,33 +184,44 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route]) -> di
     return recorded(world, episode, Sinks(args.out / "help.rrd", args.connect), eyes=world, recognise=recognise)
 
 
-def film_a_door(path: Path, world: World) -> Path | None:
-    """Film how the door that is seen best from a viewpoint closes and opens again; None where no door is seen."""
+def film_a_walk(path: Path, world: World) -> Path | None:
+    """Film somebody of the household who walks, through a door if one is closed, and sits down; None where nobody
+    does."""
     import numpy as np
+    import shapely
 
     from embodied.cli.rollout import VIDEO_ANGLE
     from embodied.house.moment import Moment
-    from embodied.viz.video import write_video
+    from embodied.navigation.free_space import sight_floor
+    from embodied.people.day import day_of
+    from embodied.viz.video import FPS, write_video
+    from embodied.world import SLACK
 
-    best, pose = 0, None
-    for o in world.house.openings:
-        for node, eye in enumerate(world.graph.positions):
-            x, y = (np.add(o.a, o.b) / 2 - eye[:2]).tolist()
-            if o.kind == "door" and DOOR_FROM[0] < np.hypot(x, y) < DOOR_FROM[1]:
-                yaw = float(np.arctan2(y, x))
-                ids = world.panorama(node).view(yaw, -0.1, VIDEO_ANGLE, (60, 80))[2]
-                seen = int((ids == world.owners.index(f"{o.id}/leaf") + 1).sum())
-                best, pose = max((best, pose), (seen, (o.id, node, yaw)), key=lambda pair: pair[0])
-    if pose is None:
+    day, eyes, sight = day_of(world.house, world.catalogue, seed=0), world.graph.positions, sight_floor(world.house, 0)
+    walks = []
+    for name, own in day.pieces.items():
+        doors = [p.begin for p in own if p.leg and p.leg.door]
+        for a, b in pairwise(p for p in own if p.leg is None and p.settled[0] == p.settled[1]):
+            if b.spot.seat and a.spot.activity != "out" and a.end < b.begin:
+                opens = any(a.end < t < b.begin for t in doors)
+                walks.append((opens, -abs(b.begin - a.end - WALK_SECONDS), name, a.end, b.begin))
+    if not walks:
         return None
-    door, node, yaw = pose
+    *_, name, begin, end = max(walks)
 
     def frames() -> Iterator[np.ndarray]:
-        for openness in (1 + np.cos(np.linspace(0, 2 * np.pi, DOOR_FRAMES))) / 2:
-            world.show(Moment(openness={door: float(openness)}))
-            yield world.camera(world.graph.positions[node], yaw, -0.1, VIDEO_ANGLE, DOOR_SIZE).rgb
+        node = -1
+        for now in np.arange(begin, end + 1, 1 / FPS):
+            world.show(moment := day.at(now / 3600), slack=SLACK)
+            at = np.array(moment.people[name].place.position)
+            far = np.hypot(*(eyes - at)[:, :2].T)
+            line = shapely.linestrings([[eye[:2], at[:2]] for eye in eyes])
+            near = np.flatnonzero((far > 1.2) & (far < 6) & shapely.covers(sight, line))
+            node = node if node in near or not len(near) else min(near, key=lambda n: abs(far[n] - 2.5))
+            yaw = math.atan2(*(at - eyes[node])[1::-1])
+            yield world.camera(eyes[node], yaw, -0.25, VIDEO_ANGLE, WALK_SIZE).rgb
 
-    write_video(path, frames(), DOOR_SIZE)
+    write_video(path, frames(), WALK_SIZE)
     world.show(Moment())
     return path
 

@@ -15,30 +15,19 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TypeAlias
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from embodied.assets.json_file import read_toml
 from embodied.assets.people import Person, Pose
 from embodied.geometry import wrap, yaw_facing
 from embodied.house.moment import RigidPose
 
-CYCLE = {
-    "pelvis": ((0.086, 0, 0, 0.022, -0.002), (0, 0.003, 0.066, 0, 0, -0.02, 0.029), (0, 0.065, -0.043)),
-    "chest": ((-0.003, 0, 0, 0, -0.007), (0, -0.03, -0.069, 0, 0, 0.015, -0.036), (0, -0.043, -0.06)),
-    "upper_arm": ((0.014, 0.26, -0.115, 0.007, 0.02), (0.257, -0.096, 0.045, 0.011, -0.051), (0,)),
-    "forearm": ((-0.343, 0.213, -0.079, -0.024, 0.017), (0,), (0,)),
-    "offset": ((0, -0.005, -0.02), (-0.006, 0, 0, 0.005, -0.019), (-0.022, 0, 0, -0.014, -0.005)),
-    "foot": (
-        (-0.061, 0.337, 0.003, 0.016, -0.064, 0.007, -0.016, -0.008, -0.014, -0.005, 0.001),
-        (0.127, -0.049, -0.083, -0.024, 0.042, 0.022, -0.001, -0.002, -0.009, -0.001, -0.003),
-        (0.277, -0.397, -0.418, -0.171, 0.329, 0.114, 0.028, -0.039, 0.004, 0.011, 0.046),
-    ),
-}
-"""Fourier series over the cycle that begins as the right heel strikes: mean, then cosine and sine of each harmonic.
-Rotation vectors, radians, of pelvis, chest, right upper arm and forearm; x, y and z of the pelvis; and of the right
-foot how far it is ahead of the body, its ankle's height, and its pitch, toes down. Lengths in leg lengths."""
+CYCLE: Any = read_toml(Path(__file__).with_suffix(".toml"))
+"""Rows of Fourier series over a cycle, by name (gait.toml)."""
 STRIDE, STANCE = 1.405, 0.55
 """Leg lengths of a cycle of two steps, and the share of it that a foot is on the ground."""
 PACE, EASE = 1.15, 0.5
