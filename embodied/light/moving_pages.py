@@ -568,9 +568,8 @@ def _together(tiles: Sequence[np.ndarray]) -> np.ndarray:
     """(HALF_TILE, HALF_TILE, 4) as `_Hides.tiles` of several things."""
     if len(tiles) == 1:
         return tiles[0]
-    out = np.zeros((HALF_TILE, HALF_TILE, 4), np.float32)
-    out[..., 0] = 1
-    for both in tiles:
+    out = tiles[0].copy() if tiles else np.tile(np.float32([1, 0, 0, 0]), (HALF_TILE, HALF_TILE, 1))
+    for both in tiles[1:]:
         out[..., :1] *= both[..., :1]
         out[..., 1:] += both[..., 1:]
     return out

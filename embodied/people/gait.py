@@ -23,7 +23,8 @@ from scipy.spatial.transform import Rotation
 
 from embodied.assets.json_file import read_toml
 from embodied.assets.people import Person, Pose
-from embodied.geometry import wrap, yaw_facing
+from embodied.assets.people.bodies import rotation_of
+from embodied.geometry import rotation, wrap, yaw_facing
 from embodied.house.moment import RigidPose
 
 CYCLE: Any = read_toml(Path(__file__).with_suffix(".toml"))
@@ -110,8 +111,8 @@ class Limbs:
                 turned = w * cycle(bone, (phase + k / 2) % 1) + (1 - w) * np.array(still)
                 turns[f"{side}_{bone}"] = turned * (1, 1 - 2 * k, 1 - 2 * k)
         *flat, up = w * self.leg * cycle("offset", phase)
-        away = Rotation.from_euler("z", yaw_facing(heading)).apply([*flat, 0.0])
-        return Bearing(position + away, heading, feet, float(up), turns)
+        away = rotation(yaw_facing(heading)) @ flat
+        return Bearing(position + [*away, 0.0], heading, feet, float(up), turns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +239,8 @@ def between(a: Posed, b: Posed, share: float) -> Posed:
     none, joints = np.zeros(3), {}
     for name in {**a[1].joints, **b[1].joints}:
         first, last = (Rotation.from_rotvec(p.joints.get(name, none)) for _, p in (a, b))
-        joints[name] = _vector(first * Rotation.from_rotvec(share * (first.inv() * last).as_rotvec()))
+        x, y, z = (first * Rotation.from_rotvec(share * (first.inv() * last).as_rotvec())).as_rotvec().tolist()
+        joints[name] = x, y, z
     mix = lambda p, q: p + share * (q - p)
     x, y, z = mix(np.array(a[0].position), np.array(b[0].position)).tolist()
     yaw = a[0].yaw + share * float(wrap(b[0].yaw - a[0].yaw))
@@ -248,47 +250,55 @@ def between(a: Posed, b: Posed, share: float) -> Posed:
 def solved(limbs: Limbs, b: Bearing) -> Posed:
     """The place of a body and the turns of its joints; the pelvis comes down where the legs do not reach."""
     j, yaw, lift = limbs.joints, yaw_facing(b.heading), b.lift
-    back = Rotation.from_euler("z", -yaw)
-    local = lambda p: back.apply(np.asarray(p) - b.position)
-    out = {name: Rotation.from_rotvec(v) for name, v in b.turns.items()}
-    of = lambda name: out.get(name, Rotation.identity())
+    back = rotation_of((0.0, 0.0, -yaw))
+    local = lambda p: back @ (np.asarray(p) - b.position)
+    out = {name: rotation_of(v) for name, v in b.turns.items()}
+    of = lambda name: out.get(name, np.eye(3))
     pelvis = chest = of("pelvis")
     legs = [(f"{n}_thigh", f"{n}_shin", f"{n}_foot") for n in SIDES]
-    hips = [j["pelvis"] + pelvis.apply(j[n] - j["pelvis"]) for n, _, _ in legs]
+    hips = [j["pelvis"] + pelvis @ (j[n] - j["pelvis"]) for n, _, _ in legs]
     for hip, names, f in zip(hips, legs, b.feet):
         away, reach = local(f[:3]) - hip, 0.998 * limbs.length(*names)
         lift = min(lift, float(away[2]) + math.sqrt(max(reach**2 - away[:2] @ away[:2], 0.0)))
     for hip, names, f in zip(hips, legs, b.feet):
-        outwards = Rotation.from_rotvec(np.outer([1, 0.5], UP) * (f[3] - b.heading))
-        knee = outwards[1].apply(FRONT) + 0.5 * UP  # up, too: it rises where one sits
+        outwards = f[3] - b.heading
+        knee = rotation_of(UP * outwards / 2) @ FRONT + 0.5 * UP  # up, too: it rises where one sits
         thigh, shin = _bent(limbs, names, hip + UP * lift, local(f[:3]), knee, FRONT)
-        foot = outwards[0] * Rotation.from_rotvec([f[4], 0, 0])
-        out |= dict(zip(names, (pelvis.inv() * thigh, thigh.inv() * shin, shin.inv() * foot)))
+        foot = rotation_of(UP * outwards) @ rotation_of((f[4], 0.0, 0.0))
+        out |= dict(zip(names, (pelvis.T @ thigh, thigh.T @ shin, shin.T @ foot)))
     at = j["pelvis"] + UP * lift
     for below, name in (("pelvis", "spine"), ("spine", "chest")):
-        at, chest = at + chest.apply(j[name] - j[below]), chest * of(name)
-    point = lambda name: at + chest.apply(j[name] - j["chest"])
+        at, chest = at + chest @ (j[name] - j[below]), chest @ of(name)
+    point = lambda name: at + chest @ (j[name] - j["chest"])
     for n in SIDES:
         upper, lower, hand = names = f"{n}_upper_arm", f"{n}_forearm", f"{n}_hand"
         if n in b.hands:
             elbow = np.array([0.5 if n == "left" else -0.5, 0.3, -1.0])
             arm, forearm = _bent(limbs, names, point(upper), local(b.hands[n]), elbow, -FRONT)
-            out |= {upper: chest.inv() * arm, lower: arm.inv() * forearm}
+            out |= {upper: chest.T @ arm, lower: arm.T @ forearm}
         else:
-            hang, hang_lower = (Rotation.align_vectors(-UP, j[y] - j[x])[0] for x, y in pairwise(names))
-            out |= {upper: of(upper) * hang, lower: hang.inv() * of(lower) * hang_lower}
+            hang, hang_lower = (_hanging(j[y] - j[x]) for x, y in pairwise(names))
+            out |= {upper: of(upper) @ hang, lower: hang.T @ of(lower) @ hang_lower}
     if b.look is not None:
-        x, y, z = chest.inv().apply(local(b.look) - point("head"))
+        x, y, z = chest.T @ (local(b.look) - point("head"))
         turned, nod = np.clip([math.atan2(x, -y), math.atan2(z, math.hypot(x, y))], (-1.2, -0.6), (1.2, 0.6)) / 2
-        out |= dict.fromkeys(("neck", "head"), Rotation.from_euler("zx", [turned, -nod]))
+        out |= dict.fromkeys(("neck", "head"), rotation_of((0.0, 0.0, turned)) @ rotation_of((-nod, 0.0, 0.0)))
     x, y, z = b.position.tolist()
-    return RigidPose.upright((x, y, z), yaw), Pose({name: _vector(r) for name, r in out.items()}, lift)
+    vectors = zip(out, Rotation.from_matrix(np.array([*out.values()])).as_rotvec().tolist())
+    return RigidPose.upright((x, y, z), yaw), Pose({name: (a, b, c) for name, (a, b, c) in vectors}, lift)
+
+
+def _hanging(bone: np.ndarray) -> np.ndarray:
+    """(3, 3) the shortest turn of a bone (3,) until it hangs down."""
+    axis = np.cross(bone, -UP)
+    sine = float(np.linalg.norm(axis))
+    return rotation_of(axis * (math.atan2(sine, -float(bone[2])) / max(sine, 1e-12)))
 
 
 def _bent(
     limbs: Limbs, names: tuple[str, str, str], root: np.ndarray, target: np.ndarray, bend: np.ndarray, rest: np.ndarray
-) -> tuple[Rotation, Rotation]:
-    """Turns of the two bones of a limb whose end is at `target`, or as near as it reaches.
+) -> tuple[np.ndarray, np.ndarray]:
+    """(3, 3) turns of the two bones of a limb whose end is at `target`, or as near as it reaches.
 
     Args:
       bend, rest: (3,) where the joint between them goes, now and in the body that stands.
@@ -302,10 +312,12 @@ def _bent(
     over = np.cross(side, ahead) / max(float(np.linalg.norm(side)), 1e-9)
     middle = upper * (cos * ahead + math.sqrt(max(1 - cos * cos, 0.0)) * over)
     still = np.cross(first + second, rest)
-    turned = lambda new, old: Rotation.align_vectors([new, side], [old, still], weights=[np.inf, 1])[0]
+    turned = lambda new, old: _frame(new, side) @ _frame(old, still).T
     return turned(middle, first), turned(ahead * far - middle, second)
 
 
-def _vector(turn: Rotation) -> tuple[float, float, float]:
-    x, y, z = turn.as_rotvec().tolist()
-    return x, y, z
+def _frame(along: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """(3, 3) orthonormal columns: the first along (3,), the second as near to `side` as that allows."""
+    across = np.cross(along, side)
+    frame = np.array([along, np.cross(across, along), across])
+    return np.asarray(frame / np.sqrt((frame * frame).sum(1, keepdims=True))).T

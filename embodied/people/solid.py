@@ -36,9 +36,8 @@ def capsules(person: str) -> Mapping[str, tuple[np.ndarray, float]]:
         along = np.linalg.svd(flesh - middle, full_matrices=False)[2][0]
         at = (flesh - middle) @ along
         radius = float(np.percentile(np.linalg.norm(flesh - middle - np.outer(at, along), axis=1), SKIN))
-        low, high = at.min() + radius, at.max() - radius
-        ends = (low, high) if low < high else (float(at.min() + at.max()) / 2,) * 2
-        out[name] = np.array([middle + x * along for x in ends]), radius
+        half = max(np.ptp(at) / 2 - radius, 1e-3)
+        out[name] = np.array([middle + ((at.min() + at.max()) / 2 + x) * along for x in (-half, half)]), radius
     return out
 
 
@@ -46,9 +45,8 @@ def add_person(spec: mujoco.MjSpec, name: str, person: Person) -> None:
     """Capsules of somebody in a spec (`scene_spec`): mocap bodies 'name/chest' and so on, away until `stand_people`."""
     for joint, ((a, b), radius) in capsules(person.id).items():
         body = spec.worldbody.add_body(name=f"{name}/{joint}", mocap=True, pos=[0.0, 0.0, AWAY])
-        shape = {"fromto": [*a, *b]} if np.linalg.norm(b - a) > 1e-6 else {"pos": a}
-        kind = mujoco.mjtGeom.mjGEOM_CAPSULE if "fromto" in shape else mujoco.mjtGeom.mjGEOM_SPHERE
-        body.add_geom(type=kind, size=[radius, 0.0, 0.0], group=UNSEEN, **shape)
+        kind = mujoco.mjtGeom.mjGEOM_CAPSULE
+        body.add_geom(type=kind, size=[radius, 0.0, 0.0], fromto=[*a, *b], group=UNSEEN)
 
 
 def stand_people(model: mujoco.MjModel, data: mujoco.MjData, moment: Moment) -> None:
