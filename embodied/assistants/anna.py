@@ -109,11 +109,11 @@ class Residents(Anna):
         alive = tuple(p for p in house.placements if p.object_class != "person")  # figures stand for the same people
         return day_of(dataclasses.replace(house, placements=alive), self._catalogue(), seed=0)
 
-    def _rooms(self, name: str, minute: int) -> list[str | None]:
+    def _rooms(self, name: str, minute: int) -> list[str]:
         day, time = self._day(name), minute / 60
         awake = {n for n, p in day.now(time).items() if p.leg or p.spot.activity != "sleeping"}
         at = (p.place.position for n, p in day.at(time).people.items() if n in awake)
-        return [room_at(day.house, np.add(place, (0, 0, 0.5))) for place in at]
+        return [room_at(day.house, np.add(place, (0, 0, 0.5))) or "" for place in at]
 
 
 def minute_of(task: str) -> int:
