@@ -23,7 +23,7 @@ TABLE_4_2 = {"train": 51, "val": 7, "test": 10}, five_splits(82_484, 5_001, 5_01
 NEAR_ENOUGH = 2.0
 """Metres from the target of a sub-task within which it succeeded."""
 
-RULES = ("told", "shown", "living", "living-shown")
+HANNA_RULES = ("told", "shown", "living", "living-shown")
 """People tell the way, or walk it ahead, too; people stand where routes begin, or are where their day has them."""
 LIMITS = FindConfig("hanna", reach=2.5, fewest_nodes=5, most_nodes=15, radius=2.0, horizon=50)
 """Limits of 4.2.5 and Table D.1; training takes 20 steps. An instance counts when a node of its room is within reach;
@@ -97,8 +97,8 @@ class ShowingEnv(HannaEnv):
 def environments(inputs: task_kind.EnvInputs) -> task_kind.EnvMaker:
     worlds = inputs.worlds
     routes = {name: known for name in worlds if (known := inputs.routes(name))}
-    if inputs.rules not in RULES:
-        raise ValueError(f"rules of HANNA should be one of {RULES}, got {inputs.rules!r}")
+    if inputs.rules not in HANNA_RULES:
+        raise ValueError(f"rules of HANNA should be one of {HANNA_RULES}, got {inputs.rules!r}")
     split = inputs.wording
     if inputs.rules.startswith("living"):
         anna: Anna = Residents(worlds, routes, split=split)
@@ -130,7 +130,7 @@ HANNA = task_kind.register_kind(
         title="HANNA",
         tasks=tasks,
         environment=environments,
-        rules=RULES[0],
+        rules=HANNA_RULES[0],
         help="words",
         baselines={
             **task_kind.PLAIN_AGENTS,  # in the next three the teacher navigates: they show what asking so costs
