@@ -27,6 +27,7 @@ HOMES = {
             "render/",
             "envs/driven.py",
             "envs/robots.py",
+            "gym/bring.py",
             "gym/robot.py",
             "light/",
             "bench/",
