@@ -27,7 +27,7 @@ from embodied.scene.house_meshes import house_parts
 from embodied.scene.model import compile_scene
 from embodied.world import open_world
 
-LARGE_HOUSE = HouseConfig(area=(400.0, 440.0))
+LARGE_HOUSE = HouseConfig(area=(400.0, 440.0), storeys=1)
 """A house of about 125 viewpoints; Matterport3D has 117 per building."""
 
 

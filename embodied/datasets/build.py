@@ -68,8 +68,8 @@ class DatasetConfig:
     seed: int = 0
     area: tuple[float, float] = (150.0, 420.0)
     """Smallest and largest house, square metres."""
-    storeys: int = 1
-    """Of every house, 1 to 3."""
+    storeys: int | None = 1
+    """Of every house, 1 to 3; None: drawn from its seed (HouseConfig)."""
     routes: str = "sampled"
     """'sampled', as in Room-to-Room."""
     people: bool = True

@@ -66,8 +66,9 @@ class HouseConfig:
     """Number of bedrooms (main, children's, guest), 1 to 12."""
     shape: str | None = None
     """Shape of the floor plan."""
-    storeys: int = 1
-    """Number of storeys, 1 to 3; `area`, `rooms` and `bedrooms` are of all of them."""
+    storeys: int | None = None
+    """Number of storeys, 1 to 3; `area`, `rooms` and `bedrooms` are of all of them. None: some houses above 110 m2 have
+    two, and some above 220 m2 three."""
     open_plan: bool | None = None
     """Connect kitchen, dining and living room by wide openings."""
     style: str | None = None
@@ -133,8 +134,9 @@ class HouseConfig:
         """The smallest total area, square metres, that holds what is asked for."""
         rooms = max(self.rooms or 2, (self.bedrooms or 1) + 1)
         shape = {"L": 75.0, "T": 95.0, "U": 150.0, "cross": 210.0}.get(self.shape or "", 0.0)
-        storey = max(shape, 45.0 if self.storeys > 1 else 0.0)
-        return max(AREAS[0] + 17.0 * (rooms - 2), storey * self.storeys)
+        storeys = self.storeys or 1
+        storey = max(shape, (0.0, 45.0, 55.0)[storeys - 1])
+        return max(AREAS[0] + 17.0 * (rooms - 2), storey * storeys)
 
     def most_area(self) -> float:
         """The largest total area, square metres, that the asked number of main rooms can fill sensibly."""

@@ -10,6 +10,8 @@ from embodied.generate.config import HouseConfig
 from embodied.generate.kinds import BEDROOMS, ROOM_TABLE
 
 FURTHER = {name: kind.extra for name, kind in ROOM_TABLE.items() if kind.extra is not None}
+HIGHER = ((110.0, 0.35), (220.0, 0.1))
+"""Area, square metres, above which a house may have a second and a third storey, and the share of houses that do."""
 DOUBLE_KINDS = ("study", "family_room", "workshop", "playroom", "sun_room", "library")
 """Kinds with an `extra` of which large houses may have two."""
 
@@ -43,13 +45,23 @@ def draw_area(config: HouseConfig, *, rng: np.random.Generator) -> float:
     return float(np.clip(area, max(35.0, config.least_area()), 600.0))
 
 
+def draw_storeys_of(area: float, config: HouseConfig, *, rng: np.random.Generator) -> int:
+    """Number of storeys of a house of `area` square metres that leaves it to the seed."""
+    chance = rng.random()
+    storeys = 1 + sum(area > least and chance < share for least, share in HIGHER)
+    while storeys > 1 and area < replace(config, storeys=storeys, area=None).least_area():
+        storeys -= 1
+    return storeys
+
+
 def draw_program(area: float, config: HouseConfig, *, rng: np.random.Generator) -> tuple[WantedRoom, ...]:
     """The rooms of a house of `area` square metres (corridors come with the layout).
 
     Returns:
       Spaces whose areas sum to `area` less the circulation that a corridor will take.
     """
-    area -= 9.0 * config.storeys * (config.storeys > 1)  # stairs
+    storeys = config.storeys or 1
+    area -= 9.0 * storeys * (storeys > 1)  # stairs
     bedrooms = config.bedrooms or _bedrooms(area, config, rng)
     spaces = [WantedRoom("hall", float(np.clip(0.045 * area, 3.0, 13.0)))]
     living = float(np.clip(rng.normal(0.2, 0.025) * area, 14, np.interp(area, (260, 500), (38, 52))))

@@ -24,7 +24,7 @@ from embodied.generate.layout import FloorPlan, draw_plan, turned, with_short_co
 from embodied.generate.modules import Cell
 from embodied.generate.novelty import furnishable
 from embodied.generate.openings import Leaves, draw_openings
-from embodied.generate.program import WantedRoom, draw_area, draw_program
+from embodied.generate.program import WantedRoom, draw_area, draw_program, draw_storeys_of
 from embodied.generate.stairwell import SLAB, TALLEST, stair_of
 from embodied.generate.storeys import draw_storeys
 from embodied.generate.walkways import remove_blocking_objects
@@ -80,10 +80,15 @@ def _made(value: Made | None, stage: str) -> Made:
 def footprint(draft: Draft) -> Draft:
     """Total area, shape and thirty footprints of it; houses of several storeys draw theirs with their rooms."""
     area = draw_area(draft.config, rng=stream(draft.seed, "house", "area"))
-    rng, storeys = stream(draft.seed, "house", "footprint"), draft.config.storeys
-    shape = draw_shape(area / storeys, draft.config, rng=rng)
+    rng, config = stream(draft.seed, "house", "footprint"), draft.config
+    late = draft.attempt >= RETRIES.house // 2  # what is easier is tried then
+    drawn = 1 if late else draw_storeys_of(area, config, rng=stream(draft.seed, "house", "storeys"))
+    storeys = config.storeys or drawn
+    simple = late and storeys > 1 and config.shape is None
+    shape = "rectangle" if simple else draw_shape(area / storeys, config, rng=rng)
     footprints = tuple(draw_footprint(area, shape, rng=rng) for _ in range(30)) if storeys == 1 else ()
-    return dataclasses.replace(draft, area=area, shape=shape, footprints=footprints)
+    config = dataclasses.replace(config, storeys=storeys)
+    return dataclasses.replace(draft, config=config, area=area, shape=shape, footprints=footprints)
 
 
 def program(draft: Draft) -> Draft:
@@ -97,7 +102,7 @@ def rooms(draft: Draft) -> Draft:
     """The best of many plans."""
     rng = stream(draft.seed, "house", "rooms", draft.attempt)
     footprints, spaces = draft.footprints, draft.spaces
-    storeys = draft.config.storeys
+    storeys = draft.config.storeys or 1
     if draft.attempt:
         if storeys == 1:
             footprints = tuple(draw_footprint(draft.area, draft.shape, rng=rng) for _ in range(24))

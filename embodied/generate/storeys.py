@@ -9,7 +9,7 @@ import numpy as np
 
 from embodied.generate.access import WET, shared_wall
 from embodied.generate.footprint import Band, Footprint, draw_footprint, shared_area
-from embodied.generate.kinds import BEDROOMS
+from embodied.generate.kinds import BEDROOMS, ROOM_TABLE
 from embodied.generate.layout import FloorPlan, draw_plan
 from embodied.generate.modules import Cell
 from embodied.generate.program import WantedRoom, scaled
@@ -18,6 +18,8 @@ UPSTAIRS = (*BEDROOMS, "bathroom", "closet", "playroom", "study", "library", "gy
 """Kinds of room that belong upstairs."""
 EITHER = ("study", "library", "gym", "playroom", "guest_room")
 """Kinds that lie where there is room."""
+ENOUGH = 0.85
+"""Share of the mean of all storeys up to which an upper one gets rooms."""
 FOOTPRINTS = 14
 """Footprints among which a storey's plan is drawn."""
 STAIRS = ((9.7, 0.0), (16.5, 170.0), (27.0, 330.0))
@@ -55,18 +57,25 @@ def _by_storey(spaces: tuple[WantedRoom, ...], storeys: int) -> list[list[Wanted
             high, low = (sum(x.area for x, k in zip(spaces, storey) if k == up) for up in (1, 0))
             if s.kind == kind and storey[i] and high - low > s.area * (1.0 if storeys == 2 else 3.0):
                 storey[i] = 0
-    for k in range(2, storeys):  # those that are left share the storeys above, the main bedroom on the lowest
-        upper = [i for i, s in enumerate(spaces) if storey[i] == k - 1 and s.owner is None and s.kind != "main_bedroom"]
-        for i in upper[len(upper) // (storeys - k + 1) :]:
-            storey[i] = k
+    size = lambda i: sum(s.area for k, s in enumerate(spaces) if i in (k, s.owner))
+    sizes = [sum(s.area for s, k in zip(spaces, storey) if not k and s.owner is None), *[0.0] * (storeys - 1)]
+    upper = [i for i, s in enumerate(spaces) if storey[i] and s.owner is None]
+    for i in sorted(upper, key=lambda i: (spaces[i].kind != "main_bedroom", -size(i))):  # the first on the lowest
+        storey[i] = 1 + int(np.argmin(sizes[1:]))
+        sizes[storey[i]] += size(i)
     storey = [k if s.owner is None else storey[s.owner] for s, k in zip(spaces, storey)]
     own: list[list[WantedRoom]] = []
+    kinds, enough = [s.kind for s in spaces], ENOUGH * sum(sizes) / storeys
     for k in range(storeys):
         here = [i for i in range(len(spaces)) if storey[i] == k]
         rooms = [spaces[i] for i in here]
         rooms = [replace(s, owner=here.index(s.owner)) if s.owner is not None else s for s in rooms]
         if not any(s.kind in ("bathroom", "toilet") and (not k or s.owner is None) for s in rooms):
             rooms.append(WantedRoom("bathroom", 4.5) if k else WantedRoom("toilet", 1.9))
+        for kind in EITHER if k and storeys > 2 else ():
+            if kind not in kinds and sum(s.area for s in rooms) + ROOM_TABLE[kind].area[0] / 2 < enough:
+                rooms.append(WantedRoom(kind, ROOM_TABLE[kind].area[0]))
+                kinds.append(kind)
         own.append(rooms)
     return own
 
