@@ -481,7 +481,7 @@ class Feature:
     horizontal: int = 0
     """Direction in steps of 30 degrees, 0..11, counter-clockwise from +x; 0 for rooms."""
     vertical: int = 0
-    """-1, 0 or 1 steps of 30 degrees."""
+    """-1, 0 or 1 steps of 30 degrees; of rooms 1 for those upstairs."""
     distance: int = 0
     """Metres rounded down, 0..4."""
 

@@ -31,7 +31,7 @@ PRIVATE = (*BEDROOMS, "bathroom", "toilet", "closet", "pantry")
 
 @functools.cache
 def house_of(seed: int) -> House:
-    return generate_house(seed, stages=BARE)
+    return generate_house(seed, HouseConfig(storeys=1), stages=BARE)
 
 
 def houses() -> tuple[House, ...]:

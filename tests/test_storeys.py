@@ -14,9 +14,12 @@ import shapely
 from PIL import ImageChops
 
 from embodied.assets.catalogue import load_catalogue
+from embodied.assistants.descriptions import Describer, described
 from embodied.envs.continuous import ContinuousEnv, ContinuousEpisode, NavigationGoal, ShortestPathFollower
 from embodied.generate import STAGES, HouseConfig, generate_house
+from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.plan_file import house_of_plan, load_plan
+from embodied.generate.program import draw_storeys_of
 from embodied.generate.stairwell import fitting
 from embodied.house.floor_plan import paint_plan
 from embodied.house.house import House, HouseError
@@ -27,10 +30,13 @@ from embodied.language.lexicon import lexicon_of
 from embodied.language.route_clauses import legs_of
 from embodied.language.templates import SPEAKERS
 from embodied.navigation.connectivity import from_matterport, to_matterport
+from embodied.navigation.floor_ways import FloorWays
 from embodied.navigation.free_space import EYE
 from embodied.navigation.graph import build_graph, stair_ends
+from embodied.navigation.poses import FreePoses
 from embodied.scene.model import COLLISION, build_spec
 from embodied.scene.stairs import flights_of
+from embodied.seeds import stream
 
 SEEDS = (0, 1)
 BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "clear")}
@@ -52,6 +58,21 @@ def house_of(seed: int, storeys: int = 2, *, bare: bool = False) -> House:
 @pytest.fixture(params=SEEDS)
 def house(request) -> House:
     return house_of(request.param)
+
+
+def test_some_houses_above_110_square_metres_have_storeys_and_none_below():
+    number = lambda seed, area: draw_storeys_of(area, HouseConfig(), rng=stream(seed, "house", "storeys"))
+    assert {number(s, 105.0) for s in range(60)} == {1} and {number(s, 150.0) for s in range(60)} == {1, 2}
+    assert 0.2 < np.mean([number(s, 150.0) == 2 for s in range(200)]) < 0.5
+    assert {number(s, 300.0) for s in range(60)} == {1, 2, 3}
+    assert draw_storeys_of(160.0, HouseConfig(shape="U"), rng=stream(2, "house", "storeys")) == 1, "too small for a U"
+
+
+def test_rooms_of_three_storeys_are_not_stretched():
+    for seed in (2, 8):
+        for r in house_of(seed, 3, bare=True).rooms:
+            most = 1.4 * ROOM_TABLE[r.kind].area[1]
+            assert r.kind in ("hall", "corridor") or shapely.Polygon(r.polygon).area < most, r.id
 
 
 @pytest.mark.parametrize("storeys", [2, 3])
@@ -149,6 +170,20 @@ def test_a_body_of_vlnce_climbs_in_ordinary_steps(house):
         walked = env.trajectory()
         assert walked.success and np.abs(np.diff(walked.positions[:, 2])).max() < 0.3
         assert 0.7 * graph.distance[a, b] < walked.shortest <= graph.distance[a, b] + 0.5
+
+
+def test_a_person_stands_on_stairs_at_their_height_and_wheels_stay_below(house):
+    (stair,), graph = house.stairs, build_graph(house)
+    poses = FreePoses(house, graph)
+    for f in flights_of(stair):
+        middle = f.at(f.length / 2, 0.0, f.risers / 2 * f.rise)
+        assert poses.is_free(middle + [0, 0, EYE]) and not poses.is_free(middle + [0, 0, EYE + 1])
+    wheels = FloorWays(house, stairs=False)
+    assert np.ptp(wheels.xyz[:, 2]) == 0 and not shapely.intersects_xy(well_of(stair), *wheels.xyz[:, :2].T).any()
+    place, say = SimpleNamespace(house=house, graph=graph), Describer(())
+    rooms = [say.sparse(place, n, goal=True) for n in range(len(graph.ids))]
+    upstairs = [house.room_by_id[r].storey > 0 for r in graph.room_of_node]
+    assert ["upstairs" in described(r) for r in rooms] == upstairs
 
 
 def test_stairs_are_spoken_of_as_one_stretch_and_read_back():

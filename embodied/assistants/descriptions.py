@@ -83,7 +83,8 @@ class Describer:
         return choices[int(rng.integers(len(choices)))]
 
     def _room(self, world: Place, node: int) -> Feature:
-        return Feature("room", world.house.room_by_id[world.graph.room_of_node[node]].kind)
+        room = world.house.room_by_id[world.graph.room_of_node[node]]
+        return Feature("room", room.kind, vertical=int(room.storey > 0))
 
     def _near(self, world: Place, node: int, goal: bool) -> Description:
         radius = GOAL_RADIUS if goal else STATE_RADIUS
@@ -195,7 +196,7 @@ def described(description: Description, pose: Pose | None = None) -> str:
     actions = [f for f in description if f.kind == "action"]
     if actions:
         return "You are there." if actions[0].name == "stop" else "It is the next step from where you are."
-    rooms = [f.name.replace("_", " ") for f in description if f.kind == "room"]
+    rooms = [f.name.replace("_", " ") + " upstairs" * f.vertical for f in description if f.kind == "room"]
     things = [_thing(f, pose) for f in description if f.kind == "object"][:6]
     place = f"{'You are in' if pose else 'Go to a place in'} the {rooms[0]}" if rooms else "There is no room to name"
     listed = " and ".join([", ".join(things[:-1]), *things[-1:]] if len(things) > 1 else things)
@@ -224,7 +225,7 @@ def features_in_words(description: Description, turn: int) -> str:
     parts = []
     for f in description:
         if f.kind == "room":
-            parts.append(f.name.replace("_", " "))
+            parts.append(f.name.replace("_", " ") + " upstairs" * f.vertical)
         elif f.name == "stop":
             parts.append("you are there")
         else:

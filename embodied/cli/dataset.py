@@ -29,10 +29,6 @@ FROM_PEOPLE = "from-people"
 SCALE_HELP = {name: described(name) for name in DATASET_SCALES}
 
 
-def _storeys(text: str) -> int | None:
-    return None if text == "drawn" else whole(1, 3)(text)
-
-
 @dataclass(frozen=True, kw_only=True)
 class DatasetOptions(Furnished, Printed):
     kind: Annotated[str, Option(metavar="KIND", name="kind")]
@@ -53,8 +49,8 @@ class DatasetOptions(Furnished, Printed):
     """Random seed; the same seed gives the same data set."""
     area: Annotated[tuple[float, float], Option(metavar=("LOW", "HIGH"))] = (150.0, 420.0)
     """Size of the houses in square metres."""
-    storeys: Annotated[int | None, Option(_storeys, "{1,2,3,drawn}")] = 1
-    """Storeys of every house, or drawn from its seed (all kinds but vqa)."""
+    storeys: Annotated[int, Option(whole(0, 3), "N")] = 1
+    """Storeys of every house, 0: drawn from its seed (all kinds but vqa)."""
     language: Annotated[str, Option(words=("people", "landmarks", "plain"))] = "people"
     """Wording of the routes: varied, with habits and landmarks (people), always with landmarks, of paths on which turns
     alone lead astray (landmarks), or plain turns and rooms (plain)."""
@@ -118,8 +114,8 @@ def run(args: DatasetOptions) -> None:
     from embodied.datasets.store import Dataset
     from embodied.generate import HouseConfig
 
-    HouseConfig(area=args.area, storeys=args.storeys)  # refuses what no house can have, before a folder is made
-    words: dict[str, Any] = {"language": args.language, "rooms": not args.no_rooms, "storeys": args.storeys}
+    HouseConfig(area=args.area, storeys=args.storeys or None)  # refuses what no house can have, before a folder is made
+    words: dict[str, Any] = {"language": args.language, "rooms": not args.no_rooms, "storeys": args.storeys or None}
     people = not args.no_people
     config = DatasetConfig(args.kind, chosen_scale(args), args.seed, args.area, people=people, ood=args.ood, **words)
     watch = lambda jobs, total: tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())

@@ -42,7 +42,7 @@ class FloorWays:
           HouseError: there is no free floor at all.
         """
         house, self._house = opened(house, ajar_doors(house)), house
-        self._bands = [_band(house, s) for s in house.stairs if stairs]
+        self._bands = [band_of(house, s) for s in house.stairs if stairs]
         spaces, names, cells, rows, matrices = [], [], [], 0, []
         for k in range(len(house.storeys) if stairs else 1):
             ends = [e for b in self._bands for storey, e in zip(b.storeys, b.ends) if storey == k]
@@ -203,7 +203,8 @@ class _Band:
         return np.interp(self.along(xy), *self.slope.T)
 
 
-def _band(house: House, stair: Stair) -> _Band:
+def band_of(house: House, stair: Stair) -> _Band:
+    """The places on a stair."""
     path, half = np.asarray(stair.path, float), stair.width / 2 - AGENT_RADIUS - RAILING
     run = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1)))
     tips = [(p, OVERLAP * (p - q) / np.linalg.norm(p - q)) for p, q in (path[:2, :2], path[:-3:-1, :2])]

@@ -465,11 +465,7 @@ def _join(
             continue
         cell = int(cells[cell])
         close = np.flatnonzero(np.hypot(*(xy - grid.xy[cell]).T) < longest)
-        seen = (
-            close[shapely.covers(space, shapely.linestrings([(grid.xy[cell], xy[k]) for k in close]))]
-            if (len(close))
-            else close
-        )
+        seen = close[[bool(space.covers(shapely.LineString([grid.xy[cell], xy[k]]))) for k in close] or slice(0)]
         if len(np.unique(label[seen])) > 1:
             nodes = [*nodes, cell]
     for _ in range(len(nodes)):

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from embodied.house.house import House, HouseError
+from embodied.navigation.floor_ways import band_of
 from embodied.navigation.free_space import EYE
 from embodied.navigation.graph import NavGraph, walkable
 
@@ -18,6 +19,7 @@ class FreePoses:
 
     def __init__(self, house: House, graph: NavGraph) -> None:
         self._levels = np.array([s.elevation for s in house.storeys])
+        self._bands = [band_of(house, s) for s in house.stairs]
         self._floors = tuple(self._reached(house, graph, storey) for storey in range(len(house.storeys)))
 
     def _reached(self, house: House, graph: NavGraph, storey: int) -> shapely.Geometry:
@@ -29,12 +31,15 @@ class FreePoses:
         return reached
 
     def is_free(self, position: Sequence[float] | np.ndarray) -> bool:
-        """True if the body can stand at (x, y) of the ground floor, or at (x, y, z) of the storey that z is in."""
+        """True if the body can stand at (x, y) of the ground floor, or at (x, y, z) of the storey that z is in, or on
+        stairs with its eye within 0.4 m of z."""
         x, y, z = (*position, EYE) if len(position) == 2 else position
         if not np.isfinite([x, y, z]).all():
             raise ValueError(f"a position should be finite numbers in metres, got {tuple(position)}")
         storey = int(np.searchsorted(self._levels, z + 1e-6, side="right")) - 1
-        return storey >= 0 and bool(shapely.covers(self._floors[storey], shapely.Point(x, y)))
+        here, xy = shapely.Point(x, y), np.array([[x, y]])
+        on_stairs = any(abs(b.height(xy)[0] + EYE - z) < 0.4 and shapely.covers(b.shape, here) for b in self._bands)
+        return on_stairs or (storey >= 0 and bool(shapely.covers(self._floors[storey], here)))
 
     def draw(self, *, rng: np.random.Generator) -> tuple[np.ndarray, float]:
         """A pose drawn evenly over the free floor.
