@@ -1,4 +1,4 @@
-"""Table 3.2, Figures 3.4 and 3.5 as data; BANDIT as a learner of the engine.
+"""BANDIT as a learner of the studies' engine.
 
 `pretrain_KEY/seed_N` holds reference models and critics that runs of a seed begin with.
 """
@@ -19,74 +19,16 @@ from embodied.agents.bandit.training import RATED, TokenizedCorpora, bandit, loa
 from embodied.agents.common.session import Note
 from embodied.agents.common.weights import read_checkpoint
 from embodied.agents.studies.engine import Measured, StudyLearner
-from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
+from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
 from embodied.evaluation.tables import Samples
 from embodied.records import identity_of, key_of
 
 SENTENCE, HELD_OUT = "per-sentence BLEU", "held-out BLEU"
-PASSES = 5
-"""Of Figure 3.4."""
-SWEEPS: Mapping[str, Sequence[float]] = {
-    "granularity": (1, 2, 3, 4, 5, 6, 7, 8, 9, 10),
-    "variance": (0.1, 0.2, 0.5, 1, 2, 5),
-    "skew": (0.25, 0.5, 0.67, 1.5, 2, 4),
-}
-"""Figure 3.5's settings; a skew of 1 is the clean rater."""
-REFERENCES = {"full": "fully", "weak": "weakly"}
-
-
-def _row(label: str, learner: str, reference: str = "full", **more: Any) -> StudyRow:
-    return StudyRow(label, {"reference": reference, "learner": learner, **more})
-
-
-def _gain(label: str, learner: str, reference: str = "full", **more: Any) -> StudyRow:
-    """A row of differences to the reference model."""
-    return dataclasses.replace(_row(label, learner, reference, **more), minus=_row("reference", "reference", reference))
-
-
-def _sweep() -> tuple[StudyRow, ...]:
-    rows = [_gain("clean", "a2c")]
-    for name, values in SWEEPS.items():
-        for value in values:
-            row = _gain(f"{name} {value:g}", "a2c", rater={name: value})
-            rows.append(dataclasses.replace(row, x=value, series=name))
-    return tuple(rows)
-
-
-BANDIT_TABLES: Mapping[str, StudyTable] = {
-    "3.2": StudyTable(
-        "Translation scores and their improvement by one round of ratings",
-        tuple(
-            row
-            for reference, how in REFERENCES.items()
-            for row in (
-                _row(f"{how} pre-trained, reference", "reference", reference),
-                _gain(f"{how} pre-trained, Δ supervised", "supervised", reference),
-                _gain(f"{how} pre-trained, Δ NED-A2C", "a2c", reference),
-            )
-        ),
-        (SENTENCE, HELD_OUT),
-    ),
-    "3.4": StudyTable(
-        "NED-A2C for five passes",
-        tuple(
-            dataclasses.replace(row, judge={"curve": True})
-            for row in (_row("NED-A2C", "a2c", passes=PASSES), _row("reference", "reference"))
-        ),
-        figure=Figure((SENTENCE.replace(" ", "_"),), "pass over the rated sentences", SENTENCE),
-    ),
-    "3.5": StudyTable(
-        "Gain by NED-A2C under imperfect ratings",
-        _sweep(),
-        (SENTENCE, HELD_OUT),
-        figure=Figure((SENTENCE.replace(" ", "_"),), "strength of the perturbation", f"Δ {SENTENCE}", log=True),
-    ),
-}
 
 
 @dataclass(frozen=True)
 class BanditStudy(StudyLearner):
-    """Table 3.2, Figures 3.4 and 3.5."""
+    """Table 3.2 and Figure 3.5."""
 
     data: Path
     """Corpus."""
@@ -101,11 +43,15 @@ class BanditStudy(StudyLearner):
     judges = ("embodied.agents.bandit.training",)
 
     def tables(self) -> Mapping[str, StudyTable]:
+        tables = study_tables("bandit")
         if self.rater is None:
-            return BANDIT_TABLES
-        people = _gain("as people rate", "a2c", rater=dataclasses.asdict(self.rater))
+            return tables
+        clean = tables["3.5"].rows[0]
+        people = StudyRow(
+            "as people rate", {**(clean.train or {}), "rater": dataclasses.asdict(self.rater)}, {}, clean.minus
+        )
         title = f"Gain by NED-A2C from ratings like people's: {self.rater}"
-        return {**BANDIT_TABLES, "people": StudyTable(title, (_gain("clean", "a2c"), people), (SENTENCE, HELD_OUT))}
+        return {**tables, "people": StudyTable(title, (clean, people), (SENTENCE, HELD_OUT))}
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """A corpus that cannot be read is refused."""
@@ -125,8 +71,7 @@ class BanditStudy(StudyLearner):
         begun, m = self._begun(seed, folder), self._corpus_of(seed)
         reference = begun / "pretrain" / f"{train['reference']}.safetensors"
         critic = begun / train["reference"] / "critic.safetensors"
-        rater, passes = Rater(**train.get("rater", {})), train.get("passes", 1)
-        bandit(m, reference, critic, home, train["learner"], rater=rater, passes=passes, note=note)
+        bandit(m, reference, critic, home, train["learner"], rater=Rater(**train.get("rater", {})), note=note)
         return home / "best.safetensors"
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
@@ -135,8 +80,6 @@ class BanditStudy(StudyLearner):
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         assert weights is not None, "every row is a run"
         history = read_checkpoint(weights.parent / "checkpoint.pt")["history"]
-        if row.judge.get("curve"):
-            return {f"{c} at {k + 1}": Samples((h[c],)) for c in (SENTENCE, HELD_OUT) for k, h in enumerate(history)}
         return {c: Samples((history[0][c],)) for c in (SENTENCE, HELD_OUT)}
 
     def about(self) -> str:

@@ -32,7 +32,7 @@ from embodied.agents.find.config import THINGS, FinderConfig
 from embodied.agents.find.network import READ, Explorer, SeekNetwork
 from embodied.agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, imitation_loss
 from embodied.agents.studies.episodes import JUDGES
-from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import SightedStudy, Split, TrainingData
@@ -256,27 +256,8 @@ def looks_of(labels: Labels, seed: int, update: int) -> torch.Tensor:
     return torch.from_numpy(stream(seed, "looks", update).integers(len(labels.seen), size=LOOKS))
 
 
-SEEING, MAP, BLIND_FINDER = (
-    StudyRow("Seeing"),
-    StudyRow("Blind, map sees", {"sees": "map"}),
-    StudyRow("Blind", {"sees": "nothing"}),
-)
-EXPLORER = StudyRow("Frontier and detector", {"agent": "detector"})
-FIND_TABLES: Mapping[str, StudyTable] = {
-    "find": StudyTable(
-        "Finding things without help",
-        (
-            SEEING,
-            MAP,
-            BLIND_FINDER,
-            EXPLORER,
-            *(StudyRow(w.capitalize(), None, {"played": w}) for w in ("random walk", "forward 10")),
-        ),
-        ("success", "spl", "oracle success", "navigation error", "steps"),
-        ("test_unseen",),
-        ((SEEING, BLIND_FINDER), (SEEING, MAP), (SEEING, EXPLORER)),
-    )
-}
+SEVERAL = ("Seeing", "Blind")
+"""Rows that learn with several seeds; who is only compared with learns once."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -292,11 +273,10 @@ class FindStudy(SightedStudy):
     judges = (*JUDGES, "embodied.agents.find.study")
 
     def tables(self) -> Mapping[str, StudyTable]:
-        return FIND_TABLES
+        return study_tables("find")
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
-        """Who is only compared with learns once."""
-        return self.repeats if dataclasses.replace(row, minus=None) in (SEEING, BLIND_FINDER) else self.repeats[:1]
+        return self.repeats if row.label in SEVERAL else self.repeats[:1]
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         train_finder(self.training_data(), self.settings(train, seed), home, self.cache, note=note)

@@ -1,4 +1,4 @@
-"""The tables of 4.2 as data, and HANNA as a learner of embodied.agents.studies.engine."""
+"""HANNA as a learner of embodied.agents.studies.engine."""
 
 from __future__ import annotations
 
@@ -12,86 +12,11 @@ from embodied.agents.common.session import Note
 from embodied.agents.hanna.agent import HannaAgent, by_the_text, hanna_policies, train_agent
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from embodied.agents.studies.episodes import JUDGES
-from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
 from embodied.agents.vision.sighted_study import TEST_SPLITS as TEST
 from embodied.agents.vision.sighted_study import SightedStudy, TrainingData
 from embodied.datasets.store import Dataset, SplitData
 from embodied.interface import Agent
-
-VALIDATION_SPLITS = ("val_seen", "val_unseen")
-FULL = ("success", "spl", "navigation error", "requests")
-
-
-def learned(label: str, played: str = "learned", **train: Any) -> StudyRow:
-    """A row of an agent that differs from the settings of the study in `train`."""
-    return StudyRow(label, train, {"played": played})
-
-
-def without(label: str, played: str) -> StudyRow:
-    """A row of an agent that does not learn."""
-    return StudyRow(label, None, {"played": played})
-
-
-NO_ASK = learned("No ask", ask_rule="never", alpha=0.5)
-RANDOM_ASK = learned("Random ask", ask_rule="random", alpha=0.5)
-EVERY_5 = learned("Ask every 5", ask_rule="every5", alpha=0.5)
-LEARNED = learned("Learned")
-HALF = learned("half curiosity", alpha=0.5)
-IMAGE_ONLY = learned("Target image only", read_assistance=False)
-LANGUAGE = learned("+ language instruction")
-LSTM = learned("LSTM encoder-decoder", model="lstm", alpha=0.0, predict_reasons=False)
-NO_CURIOSITY = learned("Our model, alpha = 0", alpha=0.0)
-OURS = learned("Our model, alpha = 1")
-PLAIN_OURS = learned("our model, alpha = 0, no conditions", alpha=0.0, predict_reasons=False)
-ABLATIONS: Mapping[str, Mapping[str, Any]] = {
-    "No inter-task reset": {"reset_inter_task": False},
-    "No condition prediction": {"predict_reasons": False},
-    "No cosine-similarity attention": {"similarity_attention": False},
-    "No curiosity loss": {"alpha": 0.0},
-}
-HANNA_TABLES: Mapping[str, StudyTable] = {
-    "4.3": StudyTable(
-        "Results on the test splits",
-        (
-            without("Random walk", "random walk"),
-            without("Forward 10", "forward 10"),
-            learned("No assistance", ask_rule="never", alpha=0.5),
-            learned("Learn to interpret assistance"),
-            without("Shortest", "shortest"),
-            learned("Perfect assistance interpretation", "learned, perfect interpretation"),
-            learned("Blind", "blind"),
-            learned("Rules only", "rules only"),
-        ),
-        FULL,
-        TEST,
-    ),
-    "4.4": StudyTable("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
-    "4.5": StudyTable(
-        "Help-request policies",
-        (NO_ASK, RANDOM_ASK, EVERY_5, LEARNED),
-        ("success", "requests"),
-        TEST,
-        tuple((one, other) for one in (LEARNED, HALF) for other in (NO_ASK, RANDOM_ASK, EVERY_5)),
-    ),
-    "4.6": StudyTable(
-        "Model and curiosity",
-        (LSTM, NO_CURIOSITY, OURS),
-        ("success", "mistake repeat", "request repeat"),
-        ("test_unseen",),
-        ((PLAIN_OURS, LSTM), (OURS, NO_CURIOSITY)),
-    ),
-    "D.2": StudyTable(
-        "Ablations",
-        (learned("Final agent"), *(learned(name, **off) for name, off in ABLATIONS.items())),
-        FULL,
-        VALIDATION_SPLITS,
-        tuple((learned("Final agent"), learned(name, **off)) for name, off in ABLATIONS.items()),
-    ),
-}
-"""The studies by name. D.2 is on the validation splits, as in the dissertation. Pairs that are compared differ in one
-thing, but for learned asking and other rules, which have the authors' alpha; half curiosity is learned asking with the
-alpha of these rules (Table D.1, note)."""
-
 
 PRINTED = ("4.3", "4.4", "4.5", "4.6", "D.2")
 """Tables whose numbers the dissertation prints: judged as the text has it, and in columns of their own as we do."""
@@ -125,7 +50,7 @@ class HannaStudy(SightedStudy):
     def tables(self) -> Mapping[str, StudyTable]:
         """Splits out of distribution come beside the test splits."""
         ood, tables = Dataset(self.data).ood, {}
-        for name, table in HANNA_TABLES.items():
+        for name, table in study_tables("hanna").items():
             wider = dataclasses.replace(table, splits=(*table.splits, *ood)) if table.splits == TEST else table
             tables[name] = in_both_ways(wider) if name in PRINTED else wider
         return tables

@@ -19,7 +19,7 @@ from embodied.agents.hari.networks import INTENTIONS, Executor, HariAgent, load_
 from embodied.agents.hari.policy import ASKS, DO, DONE, Belief, Reader, action_of, available, carry, consider, policy_of
 from embodied.agents.studies.engine import Measured
 from embodied.agents.studies.episodes import JUDGES, EpisodeStudy
-from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
+from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
 from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation.tables import Samples
 from embodied.interface import Actions, Agent, Episode, Observations, Rngs
@@ -180,62 +180,8 @@ def policies(agent: HariAgent, means: Mapping[str, float]) -> dict[str, Agent]:
     }
 
 
-ACTIONS = ("CUR", "GOAL", "SUB", "DO")
-SUB_RULE = "SUB whenever possible"
-RULE_ROWS = ("no assistance", "dense goal", "dense state", "dense goal and state", SUB_RULE, RANDOM)
 TIMES = "times"
 """In a row: whether intentions are counted by time."""
-
-
-def _learned(label: str, played: str = "learned", **train: Any) -> StudyRow:
-    return StudyRow(label, train, {"played": played})
-
-
-HARI_TABLES: Mapping[str, StudyTable] = {
-    "4.7": StudyTable(
-        "Asking by learning and by rules",
-        (
-            *(_learned(rule, rule) for rule in RULE_ROWS),
-            _learned("learned"),
-            _learned(GREEDY, GREEDY),
-            _learned("uncooperative", cooperative=False),
-            _learned("skyline", perfect=True),
-        ),
-        ("success",),
-        run.TEST,
-        (
-            *((_learned("learned"), _learned(rule, rule)) for rule in (RANDOM, SUB_RULE)),
-            (_learned(GREEDY, GREEDY), _learned(SUB_RULE, SUB_RULE)),
-            (_learned("learned"), _learned("uncooperative", cooperative=False)),
-        ),
-        pooled=ACTIONS,
-    ),
-    "4.8": StudyTable(
-        "Goals on the stack",
-        tuple(_learned(f"stack {n}", stack=n) for n in (1, 2, 3)),
-        ("success",),
-        run.VALIDATION_CONDITIONS,
-        pooled=ACTIONS,
-    ),
-    "figure 4.5": StudyTable("Requests by condition", (_learned("learned"),), ACTIONS[:3], run.VALIDATION_CONDITIONS),
-    "figure 4.5b": StudyTable(
-        "Intentions by time step",
-        (StudyRow("learned", {}, {"played": "learned", TIMES: True}),),
-        splits=("val_unseen_env",),
-        figure=Figure(tuple(f"{name}_at" for name in INTENTIONS), "time step", "share of running episodes", share=True),
-    ),
-    "figure 4.6": StudyTable(
-        "What costs change",
-        tuple(
-            StudyRow(f"cost {c:g}, H {h}", {"cost": c, "horizon": h}, {"played": "learned"}, None, c, f"H = {h}")
-            for h in (10, 20, 30)
-            for c in (0.01, 0.05, 0.1, 0.2, 0.5)
-        ),
-        ("success", *ACTIONS),
-        run.VALIDATION_CONDITIONS,
-        figure=Figure(("success",), "cost of an action", "success (%)", log=True),
-    ),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -259,7 +205,7 @@ class HariStudy(EpisodeStudy):
         """The splits out of distribution come beside those of the tests; elsewhere, houses may all be unknown."""
         known = self.judged_in({}).lessons == dataset_of(self.data, "hari").lessons
         ood, tables = self.judged_in({}).ood, {}
-        for name, table in HARI_TABLES.items():
+        for name, table in study_tables("hari").items():
             splits = [s for s in table.splits if known or s.endswith("_env")]
             splits += ood if table.splits == run.TEST else ()
             tables[name] = dataclasses.replace(table, splits=tuple(splits))

@@ -1,4 +1,4 @@
-"""Tables 3.4, 3.5 and C.1 and Figure 3.7 as data, REGEX and NAV; ILIAD as a learner of agents.studies.engine."""
+"""ILIAD, REGEX and NAV, as a learner of agents.studies.engine."""
 
 from __future__ import annotations
 
@@ -18,47 +18,13 @@ from embodied.agents.iliad.regex.run import RegexSetup
 from embodied.agents.iliad.training import episodes_to
 from embodied.agents.iliad.training import train as learn
 from embodied.agents.studies.engine import Measured, StudyLearner
-from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
+from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
 from embodied.evaluation.tables import Samples
 from embodied.records import identity_of, key_of
 
 NEEDED = "thousand episodes to the threshold"
-LEARNING_ROWS = (
-    StudyRow("DAgger", {"learner": "dagger"}),
-    StudyRow("REINFORCE, binary", {"learner": "binary"}),
-    StudyRow("REINFORCE, continuous", {"learner": "continuous"}),
-    StudyRow("ADEL"),
-)
-DAGGER, BLIND_STUDENT = LEARNING_ROWS[0], StudyRow("DAgger, blind", {"learner": "dagger", "blind": True})
 OWN = ("blind",)
 """Settings of NAV's students in which rows differ."""
-CHANCE = StudyRow("chance: a random shortest path of 2 to 6 edges", None)
-
-
-def _table(title: str, *rows: StudyRow) -> StudyTable:
-    return StudyTable(title, rows, ("success",), ("test",), pooled=(NEEDED,))
-
-
-ILIAD_TABLES: Mapping[str, StudyTable] = {
-    "3.4": _table("Learning from descriptions, demonstrations and rewards", *LEARNING_ROWS),
-    "3.5": _table(
-        "The mixing weight", StudyRow("λ = 0", {"mixing": 0.0}), StudyRow("λ = 1", {"mixing": 1.0}), StudyRow("λ = 0.5")
-    ),
-    "C.1": _table(
-        "Annealing the mixing weight",
-        StudyRow("every 2000", {"annealed": 2000}),
-        StudyRow("every 5000", {"annealed": 5000}),
-        StudyRow("never"),
-    ),
-    "figure 3.7": StudyTable(
-        "Success over the course of training",
-        tuple(dataclasses.replace(row, judge={"curve": True}) for row in LEARNING_ROWS),
-        splits=("validation",),
-        figure=Figure(("success_at",), "training episodes", "success (share)", share=True),
-    ),
-}
-
-
 Setup = RegexSetup | NavSetup
 
 
@@ -80,12 +46,7 @@ class IliadStudy(StudyLearner):
     def tables(self) -> Mapping[str, StudyTable]:
         """REGEX is judged on its validation split, too; NAV's is that of which the best of many students was kept. In
         NAV one can be blind, and arrive by chance."""
-        if self.setup.name == "nav":
-            rows = (*LEARNING_ROWS, BLIND_STUDENT, CHANCE)
-            seen = dataclasses.replace(ILIAD_TABLES["3.4"], rows=rows, compared=((DAGGER, BLIND_STUDENT),))
-            return {**ILIAD_TABLES, "3.4": seen}
-        both = lambda t: dataclasses.replace(t, splits=("validation", "test")) if t.pooled else t
-        return {name: both(table) for name, table in ILIAD_TABLES.items()}
+        return study_tables(self.name)
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Data and teachers."""

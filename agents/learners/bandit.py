@@ -19,7 +19,7 @@ class BanditStudyOptions(StudyOptions, Repeated, Scaled):
     """A translator that learns from ratings."""
 
     tables: Tables
-    """Make these tables: 3.2, 3.4, 3.5 or, with --rater, people."""
+    """Make these tables: 3.2, 3.5 or, with --rater, people."""
     data: InputFolder
     """The corpus, a folder that `embodied corpus` made."""
     rater: InputPath | None = None

@@ -1,7 +1,9 @@
-"""A table of a study as data: rows, columns, and how it is drawn; and, stored, as a page and as a figure."""
+"""A table of a study as data: rows, columns, and how it is drawn, those of data/tables.toml among them; and, stored, as
+a page and as a figure."""
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,6 +13,7 @@ from typing import Any
 from matplotlib.figure import Figure as Picture
 
 from embodied.assets.cache import atomic_path
+from embodied.assets.json_file import read_toml
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,30 @@ class StudyTable:
     figure: Figure | None = None
     pooled: tuple[str, ...] = ()
     """Names of what is counted over all splits together."""
+
+
+@functools.cache
+def study_tables(learner: str) -> Mapping[str, StudyTable]:
+    """The tables of a learner by name, of data/tables.toml, which says what its entries mean."""
+    return {n: _table(t) for n, t in read_toml(Path(__file__).parent / "data" / "tables.toml")[learner].items()}
+
+
+def _table(plain: Mapping[str, Any]) -> StudyTable:
+    rows: dict[str, StudyRow] = {}
+    for row in (*plain.get("others", ()), *plain["rows"]):
+        changed = {} if row.pop("learns", True) else {"train": None}
+        minus = rows[row["minus"]] if "minus" in row else None
+        rows[row["label"]] = StudyRow(**{**row, **changed, "minus": minus})
+    figure = plain.get("figure")
+    return StudyTable(
+        plain["title"],
+        tuple(rows[row["label"]] for row in plain["rows"]),
+        tuple(plain.get("columns", ())),
+        tuple(plain.get("splits", ("",))),
+        tuple((rows[a], rows[b]) for a, b in plain.get("compared", ())),
+        None if figure is None else Figure(**{**figure, "columns": tuple(figure["columns"])}),
+        tuple(plain.get("pooled", ())),
+    )
 
 
 def page(body: Mapping[str, Any], picture: str | None = None) -> str:

@@ -1,5 +1,5 @@
-"""The training of a follower: imitation of the shortest path, in the loop of agents.common.imitation; and the tables of
-VLN as data, as a learner of the engine.
+"""The training of a follower: imitation of the shortest path, in the loop of agents.common.imitation; and VLN as a
+learner of the studies' engine.
 
     episodes = play tasks, actions of teacher or follower (FORCING)                                  (policy)
     loss = - log pi(a*) + progress_weight (left - left*)^2 - room_weight log p(room*)                (`losses_of`)
@@ -23,10 +23,10 @@ from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.tensors import IGNORE, choose_sampled, negative_log_likelihood
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.studies.episodes import JUDGES
-from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.agents.studies.tables import study_tables
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy, Split, TrainingData
-from embodied.agents.vln.config import MEASURES, FollowerSettings
+from embodied.agents.vision.sighted_study import SightedStudy, Split, TrainingData
+from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.policy import VlnAbout, VlnAgent, VlnMoment
 from embodied.assets.cache import digest
 from embodied.assets.catalogue import load_catalogue
@@ -133,36 +133,13 @@ def more_routes(source: Dataset, name: str, count: int, *, seed: int, cache: Pat
     return list(load_lines(path, Route))
 
 
-def _row(label: str, **train: Any) -> StudyRow:
-    return StudyRow(label, train, {"played": "learned"})
-
-
-FOLLOWER, BLIND_FOLLOWER = _row("DAgger"), _row("DAgger, blind", blind=True)
-VLN_TABLES: Mapping[str, StudyTable] = {
-    "followers": StudyTable(
-        "Followers of route instructions",
-        (
-            FOLLOWER,
-            _row("student forcing", forcing="student"),
-            _row("teacher forcing", forcing="teacher"),
-            BLIND_FOLLOWER,
-            _row("DAgger, no instruction", wordless=True),
-            *(StudyRow(name, None, {"played": name}) for name in ("random walk", "shortest")),
-        ),
-        MEASURES,
-        TEST_SPLITS,
-        ((FOLLOWER, BLIND_FOLLOWER),),
-    )
-}
-
-
 @dataclass(frozen=True, kw_only=True)
 class VlnStudy(SightedStudy):
     """Followers."""
 
     config: FollowerSettings
 
-    name, agent_kind, all_tables = "vln", VlnAgent, VLN_TABLES
+    name, agent_kind, all_tables = "vln", VlnAgent, study_tables("vln")
     makers = ("embodied.agents.vln.study",)
     judges = (*JUDGES, "embodied.agents.vln.policy")
 

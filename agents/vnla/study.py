@@ -1,6 +1,6 @@
 """VNLA: a trained agent and the rows that it is judged in (other askers, direct intervention, agents without
 learning); its training by imitation with two cross-entropies (Eq 4.2 and 4.3), in the loop of agents.common.imitation;
-and the table of its first paper (Nguyen et al. 2019, arXiv 1812.04155) as data, as a learner of the engine.
+and the table of its first paper (Nguyen et al. 2019, arXiv 1812.04155), as a learner of the studies' engine.
 
 episodes = play tasks: moves are sampled, questions are the asking teacher's, and where an advisor acts in the
            learner's place it learns from what is done all the same                              (policy)
@@ -30,9 +30,9 @@ from embodied.agents.common.tensors import choose_at, negative_log_likelihood
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features
 from embodied.agents.studies.episodes import JUDGES
-from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.agents.studies.tables import study_tables
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy, Split, TrainingData
+from embodied.agents.vision.sighted_study import SightedStudy, Split, TrainingData
 from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.looking import lessons_of, reading_loss
 from embodied.agents.vnla.network import VnlaNetwork
@@ -189,36 +189,6 @@ def train_agent(
 
 EVALUATION_SEEDS = (123, 435, 6757, 867, 983)
 """The program's."""
-VNLA_MEASURES = ("success", "room success", "navigation error", "requests")
-
-
-def _row(label: str, played: str = LEARNED, **train: Any) -> StudyRow:
-    return StudyRow(label, train, {"played": played})
-
-
-def _table(title: str, *rows: StudyRow, compared: Sequence[tuple[StudyRow, StudyRow]] = ()) -> StudyTable:
-    return StudyTable(title, rows, VNLA_MEASURES, TEST_SPLITS, tuple(compared))
-
-
-NONE, RANDOM_ASKER, LEARNED_ASKER = _row("none", NEVER), _row("random", AT_RANDOM), _row("learned")
-BLIND_NONE, BLIND_ASKER = _row("none, blind", NEVER, blind=True), _row("learned, blind", blind=True)
-LISTENER = StudyRow("scripted listener asking as the teacher", None, {"played": "listener, teacher"})
-VNLA_TABLES: Mapping[str, StudyTable] = {
-    "askers": _table(
-        "Who decides when to ask",
-        NONE,
-        _row("first", "learned, asks first"),
-        RANDOM_ASKER,
-        _row("teacher", TEACHER),
-        LEARNED_ASKER,
-        BLIND_NONE,
-        BLIND_ASKER,
-        StudyRow("scripted listener asking at random", None, {"played": "listener, random"}),
-        LISTENER,
-        compared=((LEARNED_ASKER, RANDOM_ASKER), (LEARNED_ASKER, BLIND_ASKER), (LEARNED_ASKER, LISTENER)),
-    )
-}
-"""The paper's Table 2."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -228,7 +198,7 @@ class VnlaStudy(SightedStudy):
     config: VnlaSettings
     eval_seeds: tuple[int, ...] = EVALUATION_SEEDS
 
-    name, agent_kind, all_tables = "vnla", VnlaAgent, VNLA_TABLES
+    name, agent_kind, all_tables = "vnla", VnlaAgent, study_tables("vnla")
     makers = ("embodied.agents.vnla.study",)
     judges = (*JUDGES, "embodied.agents.vnla.study")
 
