@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from embodied.agents.common.settings import AtLeastOne, Checked, Limit, Positive, RunSettings, Share
+from embodied.agents.common.settings import AtLeastOne, Checked, Limit, Positive, RunSettings, Share, scales
 
 VocabularySize = Annotated[int, Limit(lambda x: x >= 4, "at least 4, for padding, unknown words and the end")]
 
@@ -54,17 +54,6 @@ class Sizes(Checked):
     """Share of the set bandit_overlap that is in the supervised set (the dissertation: over 95 %)."""
 
 
-BANDIT_SCALES: dict[str, BanditConfig] = {
-    "mini": BanditConfig(
-        hidden_size=64,
-        source_words=5000,
-        target_words=2500,
-        pretraining_passes=6,
-        critic_passes=2,
-        pretraining_rate=3e-3,
-        bandit_rate=1e-3,
-    ),
-    "paper": BanditConfig(),
-}
+BANDIT_SCALES = scales(BanditConfig, "bandit")
 """'mini': minutes on a core; 'paper': section 3.1.5.2, for a GPU and the
 dissertation's corpora."""

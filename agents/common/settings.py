@@ -10,12 +10,15 @@ from __future__ import annotations
 import dataclasses
 import math
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from embodied.assets.json_file import read_toml
 from embodied.options import Option
+
+C = typing.TypeVar("C")
 
 
 @dataclass(frozen=True, eq=False)  # annotations are hashed
@@ -97,6 +100,12 @@ class ImitationSettings(ValidatedRunSettings):
     """Longest instruction, words."""
     validation_tasks: AtLeastOne = 200
     """Tasks of each validation."""
+
+
+def scales(kind: type[C], name: str) -> Mapping[str, C]:
+    """Settings by --scale, as scales.toml beside this file has them under a name; the defaults are the paper's."""
+    changes = {"paper": {}, **read_toml(Path(__file__).with_name("scales.toml"))[name]}
+    return {scale: kind(**changed) for scale, changed in changes.items()}
 
 
 MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes")

@@ -144,36 +144,7 @@ class HannaEvaluation(settings.EvaluationSettings):
     """In evaluation, moves after leaving a route before the learned rule asks again."""
 
 
-HANNA_SCALES: dict[str, TrainingConfig] = {
-    "mini": TrainingConfig(
-        hidden_size=128,
-        navigation_embedding=128,
-        ask_embedding=32,
-        self_heads=4,
-        text_heads=4,
-        dropout=0.2,
-        iterations=1600,
-        learning_rate=7e-4,
-        cooldown=0.4,
-        curiosity_floor=0.02,
-        environment_dropout=0.4,
-        guided_asking=0.5,
-        validate_every=200,
-        validation_tasks=200,
-    ),
-    "paper": TrainingConfig(),
-}
+HANNA_SCALES = settings.scales(TrainingConfig, "hanna")
 """'mini': minutes on two cores; 'paper': Table D.1, for one GPU (docs/sources.md, S31)."""
-EVALUATIONS: dict[str, HannaEvaluation] = {
-    "mini": HannaEvaluation(
-        revisit_weight=0.1,
-        use_goal_image=True,
-        frontier_discount=0.2,
-        first_ask_threshold=0.25,
-        route_ask_threshold=0.7,
-        min_moves_between_requests=2,
-        evaluation_temperature=0.5,
-    ),
-    "paper": HannaEvaluation(),
-}
+EVALUATIONS = settings.scales(HannaEvaluation, "hanna-evaluation")
 """How agents of each scale are judged."""

@@ -90,25 +90,6 @@ class IntentionConfig(settings.ValidatedRunSettings):
         return self.critic_iterations + self.iterations
 
 
-EXECUTION_SCALES: dict[str, ExecutionConfig] = {
-    "mini": ExecutionConfig(
-        hidden_size=128,
-        heads=4,
-        learning_rate=1e-3,
-        iterations=3_000,
-        guided=0.5,
-        cooldown=0.4,
-        subgoals=0.5,
-        stay_fraction=0.3,
-        reset_on_goal_change=True,
-        validate_every=250,
-    ),
-    "paper": ExecutionConfig(),
-}
+EXECUTION_SCALES = settings.scales(ExecutionConfig, "hari-execution")
 """'mini': about half an hour of one core; 'paper': Table E.2, for a GPU."""
-INTENTION_SCALES: dict[str, IntentionConfig] = {
-    "mini": IntentionConfig(
-        hidden_size=128, learning_rate=1e-3, batch=64, critic_iterations=30, iterations=200, validate_every=50
-    ),
-    "paper": IntentionConfig(),
-}
+INTENTION_SCALES = settings.scales(IntentionConfig, "hari-intention")

@@ -3,7 +3,7 @@ Free of torch, so that the command line answers at once."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated
 
 from embodied.agents.common import settings
@@ -103,37 +103,8 @@ class RegexConfig(TeacherConfig):
     """Updates of the student on unlabelled rules before it learns from descriptions; 0: none, as in the text."""
 
 
-REGEX_SCALES: dict[str, RegexConfig] = {
-    "mini": RegexConfig(
-        items=20_000,
-        held_out_items=1_000,
-        hidden_size=128,
-        word_size=64,
-        executor_iterations=4_000,
-        describer_iterations=4_000,
-        pretraining_iterations=1_500,
-        teacher_batch=64,
-        teacher_rate=2e-3,
-    ),
-    "tiny": RegexConfig(
-        items=20_000,
-        held_out_items=1_000,
-        hidden_size=64,
-        word_size=48,
-        character_size=24,
-        executor_iterations=3_000,
-        describer_iterations=3_000,
-        pretraining_iterations=500,
-        teacher_batch=64,
-        teacher_rate=4e-3,
-    ),
-    "paper": RegexConfig(),
-}
-LEARNER_SCALES: dict[str, LearnerConfig] = {
-    "mini": LearnerConfig(iterations=6_000, learning_rate=2e-3, cooldown=0.3, validate_every=250),
-    "tiny": LearnerConfig(iterations=2_000, learning_rate=3e-3, cooldown=0.3, validate_every=200),
-    "paper": LearnerConfig(),
-}
+REGEX_SCALES = settings.scales(RegexConfig, "iliad-regex")
+LEARNER_SCALES = settings.scales(LearnerConfig, "iliad-regex-student")
 """'tiny': minutes of one core for a learner; 'mini': an hour; 'paper': Table C.2, for a GPU."""
 
 
@@ -170,26 +141,6 @@ class NavConfig(TeacherConfig):
             raise ValueError(f"hidden_size {self.hidden_size} must be a multiple of heads {self.heads}")
 
 
-FOLLOWER = NavConfig(dropout=0.2, environment_dropout=0.3, progress_weight=0.5, room_weight=0.5, guided=0.5)
-"""As of VLN's follower (embodied.agents.vln.config)."""
-NAV_SCALES: dict[str, NavConfig] = {
-    "mini": replace(
-        FOLLOWER,
-        hidden_size=128,
-        heads=4,
-        executor_iterations=4_000,
-        describer_iterations=6_000,
-        teacher_rate=1e-3,
-        more_paths=64,
-    ),
-    "tiny": replace(
-        FOLLOWER, hidden_size=64, heads=4, executor_iterations=600, describer_iterations=1_500, teacher_rate=2e-3
-    ),
-    "paper": NavConfig(),
-}
-NAV_LEARNER_SCALES: dict[str, LearnerConfig] = {
-    "mini": LearnerConfig(iterations=4_000, learning_rate=1e-3, cooldown=0.4, threshold=0.2, validate_every=250),
-    "tiny": LearnerConfig(iterations=1_000, learning_rate=2e-3, cooldown=0.3, threshold=0.3, validate_every=50),
-    "paper": LearnerConfig(iterations=25_000, learning_rate=1e-4, threshold=0.3),
-}
+NAV_SCALES = settings.scales(NavConfig, "iliad-nav")
+NAV_LEARNER_SCALES = settings.scales(LearnerConfig, "iliad-nav-student")
 """'tiny': minutes of one core for a learner; 'mini': an hour; 'paper': Table C.2, for a GPU."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from embodied.agents.common.settings import AtLeastOne, ImitationSettings, NotAll, NotNegative, Share, Whole
+from embodied.agents.common.settings import AtLeastOne, ImitationSettings, NotAll, NotNegative, Share, Whole, scales
 from embodied.options import Option
 
 MEASURES = ("success", "spl", "nDTW", "SDTW", "navigation error")
@@ -45,20 +45,5 @@ class FollowerSettings(ImitationSettings):
     """Longest instruction, words; the rest is cut."""
 
 
-VLN_SCALES: dict[str, FollowerSettings] = {
-    "mini": FollowerSettings(
-        hidden_size=128,
-        batch=32,
-        iterations=4000,
-        more_paths=64,
-        least_teacher=0.5,
-        learning_rate=1e-3,
-        cooldown=0.4,
-        environment_dropout=0.3,
-        instruction_length=60,
-        weight_decay=0.0,
-        validate_every=500,
-    ),
-    "paper": FollowerSettings(),
-}
+VLN_SCALES = scales(FollowerSettings, "vln")
 """'mini': ten minutes of one core, and twenty more where paths are not worded yet; 'paper': for one GPU."""

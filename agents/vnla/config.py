@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from embodied.agents.common.settings import AtLeastOne, ImitationSettings, NotAll, Whole
+from embodied.agents.common.settings import AtLeastOne, ImitationSettings, NotAll, Whole, scales
 from embodied.options import Option
 
 RULES = ("indirect", "direct", "direct-mute", "algorithm-6")
@@ -43,19 +43,5 @@ class VnlaSettings(ImitationSettings):
     """Updates between validations."""
 
 
-VNLA_SCALES: dict[str, VnlaSettings] = {
-    "mini": VnlaSettings(
-        hidden_size=128,
-        word_embedding=64,
-        dropout=0.4,
-        iterations=2400,
-        looking=1680,
-        learning_rate=2e-3,
-        cooldown=0.4,
-        batch=64,
-        instruction_length=40,
-        validate_every=480,
-    ),
-    "paper": VnlaSettings(),
-}
+VNLA_SCALES = scales(VnlaSettings, "vnla")
 """'mini': some minutes of one core; 'paper': the program's, for one GPU (docs/sources.md, S113)."""
