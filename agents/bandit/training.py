@@ -20,21 +20,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from embodied.agents.bandit import network as networks
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import corpus_digest, load
-from embodied.agents.bandit.network import (
-    Critic,
-    TokenizedCorpus,
-    Translator,
-    batches,
-    begin,
-    decode,
-    greedy,
-    load_network,
-    perplexity,
-    save_network,
-    tokenized,
-)
 from embodied.agents.bandit.ratings import CLEAN, Rater, corpus_bleu, sentence_bleu
 from embodied.agents.common.session import Note, Session, descend
 from embodied.agents.common.tensors import Decisions, actor_loss, critic_loss, padded, sampled_choice
@@ -63,22 +51,24 @@ class TokenizedCorpora:
     """A corpus in numbers, ready to be learned from."""
 
     config: BanditConfig
-    splits: Mapping[str, TokenizedCorpus]
+    splits: Mapping[str, networks.TokenizedCorpus]
     lexicons: tuple[Vocabulary, Vocabulary]
     digest: str
     """Of the sets for pre-training and judging."""
     bandit_digest: str
     """Of the set that is rated."""
 
-    def translator(self) -> Translator:
+    def translator(self) -> networks.Translator:
         """An untrained translator; its weights follow from the seed."""
         source, target = self.lexicons
-        network = Translator(len(source), len(target), self.config.hidden_size)
-        return begin(network, self._generator("translator"))
+        network = networks.Translator(len(source), len(target), self.config.hidden_size)
+        return networks.begin(network, self._generator("translator"))
 
-    def critic(self) -> Critic:
+    def critic(self) -> networks.Critic:
         source, target = self.lexicons
-        return begin(Critic(len(source), len(target), self.config.hidden_size), self._generator("critic"))
+        return networks.begin(
+            networks.Critic(len(source), len(target), self.config.hidden_size), self._generator("critic")
+        )
 
     def identity(self, stage: str, *fields: str, **more: object) -> dict[str, object]:
         """The identity of a stage: settings of pre-training and those named, and the corpus."""
@@ -101,7 +91,7 @@ def load_corpus(folder: Path, config: BanditConfig) -> TokenizedCorpora:
     corpus = load(folder, (*names, RATED), longest=config.longest)
     source = most_frequent((w for a, _ in corpus["supervised"] for w in a), most=config.source_words)
     target = most_frequent((w for _, b in corpus["supervised"] for w in b), most=config.target_words)
-    splits = {name: tokenized(pairs, source, target) for name, pairs in corpus.items()}
+    splits = {name: networks.tokenized(pairs, source, target) for name, pairs in corpus.items()}
     return TokenizedCorpora(
         config, splits, (source, target), corpus_digest(folder, names), corpus_digest(folder, (RATED,))
     )
@@ -126,12 +116,12 @@ def pretrain(m: TokenizedCorpora, folder: Path, *, note: Note = print) -> list[d
         return {"loss": float(loss.detach()) * len(chosen), "sentences": len(chosen)}
 
     def finish(turn: int, sums: Mapping[str, float], history: History) -> dict[str, float]:
-        dev_perplexity = perplexity(translator, m.splits["dev"])
+        dev_perplexity = networks.perplexity(translator, m.splits["dev"])
         before = [h["dev perplexity"] for h in history]
         if turn == 0:
-            save_network(translator, m.config, m.lexicons, folder / "weak.safetensors", identity)
+            networks.save_network(translator, m.config, m.lexicons, folder / "weak.safetensors", identity)
         if dev_perplexity < min(before, default=math.inf):
-            save_network(translator, m.config, m.lexicons, folder / "full.safetensors", identity)
+            networks.save_network(translator, m.config, m.lexicons, folder / "full.safetensors", identity)
         if turn + 1 >= DECAY_FROM and before and dev_perplexity > before[-1]:
             for group in optimizer.param_groups:
                 group["lr"] /= 2
@@ -153,7 +143,7 @@ def train_critic(m: TokenizedCorpora, reference: Path, folder: Path, *, note: No
     """
     config, data = m.config, m.splits["supervised"]
     translator, critic = m.translator(), m.critic()
-    load_network(translator, reference)
+    networks.load_network(translator, reference)
     optimizer = adam(critic, config.pretraining_rate)
     identity = m.identity("critic", "critic_passes", begin=weights_digest(reference))
     parts: dict[str, Stateful] = {"critic": critic, "critic optimizer": optimizer}
@@ -169,7 +159,7 @@ def train_critic(m: TokenizedCorpora, reference: Path, folder: Path, *, note: No
         return {"error": 2 * float(loss.detach()) * len(chosen), "words": int(rated.mask.sum())}
 
     def finish(turn: int, sums: Mapping[str, float], history: History) -> dict[str, float]:
-        save_network(critic, m.config, m.lexicons, folder / "critic.safetensors", identity)
+        networks.save_network(critic, m.config, m.lexicons, folder / "critic.safetensors", identity)
         return {"mean square error": sums["error"] / sums["words"]}
 
     return _run("critic", config.critic_passes, step, finish, folder, identity, parts, config, data, note)
@@ -199,12 +189,12 @@ def bandit(
         raise ValueError(f"learner must be one of {BANDIT_LEARNERS}, got {learner!r}")
     config, data = m.config, m.splits[RATED]
     translator, critic = m.translator(), m.critic()
-    load_network(translator, reference)
+    networks.load_network(translator, reference)
     optimizers = {"translator": adam(translator, config.bandit_rate)}
     parts: dict[str, Stateful] = {"translator": translator, "translator optimizer": optimizers["translator"]}
     about = {"begin": weights_digest(reference), "learner": learner, "rater": dataclasses.asdict(rater)}
     if learner == "a2c":
-        load_network(critic, critic_file)
+        networks.load_network(critic, critic_file)
         optimizers["critic"] = adam(critic, config.bandit_rate)
         parts |= {"critic": critic, "critic optimizer": optimizers["critic"]}
         about["critic"] = weights_digest(critic_file)
@@ -233,31 +223,36 @@ def bandit(
         return run | ({"rating": 100 * sums["rating"] / sums["sentences"]} if "rating" in sums else {})
 
     run = _run("bandit", passes, step, finish, folder, identity, parts, config, data, note)
-    save_network(translator, m.config, m.lexicons, folder / "best.safetensors", identity)
+    networks.save_network(translator, m.config, m.lexicons, folder / "best.safetensors", identity)
     return run
 
 
-def supervised_loss(translator: Translator, source: Tensor, target: Tensor) -> Tensor:
+def supervised_loss(translator: networks.Translator, source: Tensor, target: Tensor) -> Tensor:
     """Negative log-likelihood (A.7), summed over words, averaged over sentences."""
     return -translator(source, target).sum() / len(source)
 
 
 def rated_samples(
-    translator: Translator, m: TokenizedCorpora, data: TokenizedCorpus, chosen: np.ndarray, purpose: str, turn: int
+    translator: networks.Translator,
+    m: TokenizedCorpora,
+    data: networks.TokenizedCorpus,
+    chosen: np.ndarray,
+    purpose: str,
+    turn: int,
 ) -> tuple[list[list[int]], list[float]]:
     """One sampled translation of each chosen sentence (line 3 of Algorithm 2), and what a perfect rater would say:
     smoothed sentence BLEU of the words. Learners draw alike."""
     longest = m.config.longest
     uniforms = np.stack([stream(m.config.seed, purpose, "sample", turn, int(i)).random(longest) for i in chosen])
-    samples = decode(translator, rows(data.source, chosen), sampled_choice(uniforms), longest)
+    samples = networks.decode(translator, rows(data.source, chosen), sampled_choice(uniforms), longest)
     words = map(m.lexicons[1].decode, samples)
     return samples, [sentence_bleu(w, data.references[i]) for w, i in zip(words, chosen, strict=True)]
 
 
-def judged(translator: Translator, m: TokenizedCorpora, split: str) -> float:
+def judged(translator: networks.Translator, m: TokenizedCorpora, split: str) -> float:
     """Corpus BLEU of greedy translations (A.6), 0 to 100."""
     data = m.splits[split]
-    return corpus_bleu(greedy(translator, data, m.lexicons[1], m.config.longest), data.references)
+    return corpus_bleu(networks.greedy(translator, data, m.lexicons[1], m.config.longest), data.references)
 
 
 def rows(sentences: Sequence[Sequence[int]], chosen: np.ndarray) -> Tensor:
@@ -277,7 +272,7 @@ def _run(
     identity: Identity,
     parts: Mapping[str, Stateful],
     config: BanditConfig,
-    data: TokenizedCorpus,
+    data: networks.TokenizedCorpus,
     note: Note,
 ) -> list[dict[str, float]]:
     """Go on with a run until it has had its passes over `data`, whose random orders are named by `purpose`; returns
@@ -293,7 +288,7 @@ def _run(
         for update in session:
             turn, place = divmod(update, each)
             if order is None or place == 0:
-                order = batches(lengths, config.batch, stream(config.seed, purpose, "order", turn))
+                order = networks.batches(lengths, config.batch, stream(config.seed, purpose, "order", turn))
             session.add(step(order[place], turn, update))
             if place + 1 == each:
                 session.record({"pass": turn + 1, **finish(turn, session.sums, session.history)})

@@ -19,17 +19,7 @@ from typing import Any, ClassVar, Self, Unpack
 import torch
 from torch import Tensor, nn
 
-from embodied.agents.common.session import (
-    Options,
-    Progress,
-    Session,
-    descend,
-    episode_seed,
-    run,
-    seeded_dropout,
-    set_learning_rate,
-    tasks_of_update,
-)
+from embodied.agents.common import session as sessions
 from embodied.agents.common.settings import MAY_CHANGE, EvaluationSettings, ImitationSettings
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.common.weights import half_precision, load_into, load_weights, save_weights, seeded
@@ -211,18 +201,18 @@ class ImitationLearner:
           UnableError: memory ran out.
         """
         config, training = self.config, self.training
-        chosen = tasks_of_update(training.tasks, update, config.batch, config.seed)
-        tasks, seed = [self.training_task(t) for t in chosen], episode_seed(config.seed, update)
+        chosen = sessions.tasks_of_update(training.tasks, update, config.batch, config.seed)
+        tasks, seed = [self.training_task(t) for t in chosen], sessions.episode_seed(config.seed, update)
         player = self.player(update, training.bank)
         try:
-            with seeded_dropout(config.seed, update):
+            with sessions.seeded_dropout(config.seed, update):
                 self.network.train()
                 episodes, memory = play_with_memory(training.make_env, player, tasks, seed=seed)
                 experience = self.experience(episodes, memory)
                 batch_loss = self.loss_of(episodes, experience)
                 rate = config.learning_rate
-                set_learning_rate(self.optimizer, rate, update, config.iterations, config.cooldown)
-                norm = descend(batch_loss.loss, self.optimizer, f"update {update}")
+                sessions.set_learning_rate(self.optimizer, rate, update, config.iterations, config.cooldown)
+                norm = sessions.descend(batch_loss.loss, self.optimizer, f"update {update}")
         except torch.OutOfMemoryError as e:
             raise UnableError(f"out of memory at update {update}: use a smaller batch than {config.batch}") from e
         losses = [float(x.detach()) for x in batch_loss.losses]
@@ -230,8 +220,12 @@ class ImitationLearner:
 
 
 def train(
-    learner: ImitationLearner, validation: TaskSet, folder: Path, identity: Identity, **options: Unpack[Options]
-) -> Progress:
+    learner: ImitationLearner,
+    validation: TaskSet,
+    folder: Path,
+    identity: Identity,
+    **options: Unpack[sessions.Options],
+) -> sessions.Progress:
     """Train in place, from `folder`'s checkpoint if there is one (agents.common.session.run); one process at a time.
 
     Writes best.safetensors (see `validate`) and what embodied.agents.common.session writes into `folder`.
@@ -244,7 +238,7 @@ def train(
     )
     parts: dict[str, Any] = {"network": learner.network, "optimizer": learner.optimizer}
     judge = lambda session: validate(learner, validation, session)
-    done = run(folder, identity, parts, learner.config, learner.learn, judge, may_change=MAY_CHANGE, **options)
+    done = sessions.run(folder, identity, parts, learner.config, learner.learn, judge, may_change=MAY_CHANGE, **options)
     learner.network.eval()
     return done
 
@@ -270,7 +264,7 @@ def asked(episodes: Sequence[Episode], logits: Tensor, labels: Tensor) -> dict[s
     return numbers
 
 
-def validate(learner: ImitationLearner, split: TaskSet, session: Session) -> Sequence[Episode]:
+def validate(learner: ImitationLearner, split: TaskSet, session: sessions.Session) -> Sequence[Episode]:
     """Play validation tasks as in evaluation; keep the agent if it is as good as the best so far."""
     config = learner.config
     tasks = [learner.evaluation_task(t) for t in split.tasks[: config.validation_tasks]]

@@ -21,16 +21,7 @@ import torch
 from torch import Tensor
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.agents.common.session import (
-    Options,
-    Progress,
-    Session,
-    descend,
-    run,
-    seeded_dropout,
-    set_learning_rate,
-    tasks_of_update,
-)
+from embodied.agents.common import session as sessions
 from embodied.agents.common.weights import Stateful
 from embodied.agents.hari.config import ExecutionConfig
 from embodied.agents.hari.networks import EncodedDescriptions, Executor, save
@@ -72,8 +63,8 @@ class ExecutionWalk:
 
 
 def pretrain(
-    executor: Executor, source: PretrainingData, folder: Path, identity: Identity, **options: Unpack[Options]
-) -> Progress:
+    executor: Executor, source: PretrainingData, folder: Path, identity: Identity, **options: Unpack[sessions.Options]
+) -> sessions.Progress:
     """Train `executor` in place (see embodied.agents.common.session.run).
 
     Writes best.safetensors (by validation success) and what embodied.agents.common.session writes.
@@ -81,7 +72,7 @@ def pretrain(
     config, network = executor.config, executor.network
     optimizer = torch.optim.Adam(network.parameters(), config.learning_rate)
 
-    def validate(session: Session) -> Sequence[Episode]:
+    def validate(session: sessions.Session) -> Sequence[Episode]:
         tasks = source.validation[: config.validation_tasks]
         success = pretraining_success(executor, source, tasks)
         session.record({"success": success, "episodes": len(tasks)})
@@ -91,7 +82,7 @@ def pretrain(
 
     parts: dict[str, Stateful] = {"network": network, "optimizer": optimizer}
     step = lambda update: train_step(executor, optimizer, source, update)
-    done = run(folder, identity, parts, config, step, validate, may_change=MAY_CHANGE, **options)
+    done = sessions.run(folder, identity, parts, config, step, validate, may_change=MAY_CHANGE, **options)
     network.eval()
     return done
 
@@ -105,7 +96,7 @@ def train_step(
       DivergedError: not finite; no weight was changed.
     """
     config = executor.config
-    tasks = tasks_of_update(source.training, update, config.batch, config.seed)
+    tasks = sessions.tasks_of_update(source.training, update, config.batch, config.seed)
     walks = [_begin(source, t, stream(config.seed, "pretraining", update, i)) for i, t in enumerate(tasks)]
     for walk in walks if config.subgoals else ():
         if walk.rng.random() < config.subgoals:  # no farther than to what the assistant would name where it is
@@ -114,11 +105,11 @@ def train_step(
             way, walk.goal = described_subgoal(source.describer, place, walk.pose.node, goal, longest)
             walk.task = dataclasses.replace(walk.task, goal_nodes=(way[-1],))
     executor.network.train()
-    with seeded_dropout(config.seed, update):
+    with sessions.seeded_dropout(config.seed, update):
         losses, right = _play(executor, source, walks, config.horizon, guided_share(config, update))
     loss = torch.cat(losses).mean()
-    set_learning_rate(optimizer, config.learning_rate, update, config.iterations, config.cooldown)
-    descend(loss, optimizer, f"update {update}", config.clip)
+    sessions.set_learning_rate(optimizer, config.learning_rate, update, config.iterations, config.cooldown)
+    sessions.descend(loss, optimizer, f"update {update}", config.clip)
     steps = torch.cat(right)
     return {"loss": float(loss.detach()), "right moves": float(steps.float().mean()), "steps": float(len(steps))}
 

@@ -7,15 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.agents.iliad.config import (
-    LEARNER_SCALES,
-    NAV_LEARNER_SCALES,
-    NAV_SCALES,
-    REGEX_SCALES,
-    LearnerConfig,
-    NavConfig,
-    RegexConfig,
-)
+from embodied.agents.iliad import config as iliad
 from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import Nav, Repeated, ScaledDown, StudyOptions, Tables, Threaded, Timed, study_of
 from embodied.options import OutputFolder, Settings
@@ -41,16 +33,16 @@ class IliadTraining(Timed, Threaded, ScaledDown):
 class RegexTraining(IliadTraining):
     """Change words as a request says, by regular expressions."""
 
-    learner: Annotated[LearnerConfig, Settings(STUDENT, LEARNER_SCALES)]
-    world: Annotated[RegexConfig, Settings(WORLD, REGEX_SCALES)]
+    learner: Annotated[iliad.LearnerConfig, Settings(STUDENT, iliad.LEARNER_SCALES)]
+    world: Annotated[iliad.RegexConfig, Settings(WORLD, iliad.REGEX_SCALES)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class NavTraining(IliadTraining, Nav):
     """Follow routes through houses, on a `vln` or `hanna` data set with features."""
 
-    learner: Annotated[LearnerConfig, Settings(STUDENT, NAV_LEARNER_SCALES)]
-    world: Annotated[NavConfig, Settings(WORLD, NAV_SCALES)]
+    learner: Annotated[iliad.LearnerConfig, Settings(STUDENT, iliad.NAV_LEARNER_SCALES)]
+    world: Annotated[iliad.NavConfig, Settings(WORLD, iliad.NAV_SCALES)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,16 +55,16 @@ class IliadStudyOptions(StudyOptions, Repeated, ScaledDown):
 class RegexStudyOptions(IliadStudyOptions):
     """Students that learn to change words from descriptions."""
 
-    config: Annotated[LearnerConfig, Settings(STUDENT, LEARNER_SCALES, skip=OF_ROWS)]
-    world: Annotated[RegexConfig, Settings(WORLD, REGEX_SCALES)]
+    config: Annotated[iliad.LearnerConfig, Settings(STUDENT, iliad.LEARNER_SCALES, skip=OF_ROWS)]
+    world: Annotated[iliad.RegexConfig, Settings(WORLD, iliad.REGEX_SCALES)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class NavStudyOptions(IliadStudyOptions, Nav):
     """Students that learn to follow routes from descriptions."""
 
-    config: Annotated[LearnerConfig, Settings(STUDENT, NAV_LEARNER_SCALES, skip=OF_ROWS)]
-    world: Annotated[NavConfig, Settings(WORLD, NAV_SCALES, skip=("blind",))]
+    config: Annotated[iliad.LearnerConfig, Settings(STUDENT, iliad.NAV_LEARNER_SCALES, skip=OF_ROWS)]
+    world: Annotated[iliad.NavConfig, Settings(WORLD, iliad.NAV_SCALES, skip=("blind",))]
 
 
 def regex_setup(args: RegexTraining | RegexStudyOptions) -> RegexSetup:

@@ -20,21 +20,10 @@ import numpy as np
 
 from embodied.agents.common.session import Note
 from embodied.agents.common.tensors import check_device, use_threads
+from embodied.agents.vision import features as feature_files
 from embodied.agents.vision.config import LATER_CAMERA, RENDER_PRESETS, SAME_TIME, StripTraining, VisionConfig, drawing
 from embodied.agents.vision.detector import labelled, read, train_detector
 from embodied.agents.vision.encoder import Encoder, load_encoder, save_encoder
-from embodied.agents.vision.features import (
-    EQUIRECT,
-    HouseStrips,
-    all_classes,
-    encode_strips,
-    feature_path,
-    has_features,
-    load_features,
-    look,
-    margin,
-    save_features,
-)
 from embodied.agents.vision.training import train_encoder, whitened
 from embodied.assets.cache import digest, write_json
 from embodied.assets.catalogue import load_catalogue
@@ -98,18 +87,18 @@ class StripSource:
     workers: int = 1
     """Houses drawn side by side."""
 
-    def training_strips(self, names: Sequence[str], note: Callable[[str], None]) -> list[HouseStrips]:
+    def training_strips(self, names: Sequence[str], note: Callable[[str], None]) -> list[feature_files.HouseStrips]:
         """The strips of training houses, the first `lit` of them in light."""
         in_light = dataclasses.replace(self, picture_kind="fast")
         return [*in_light.strips(names[: self.lit], note), *self.strips(names[self.lit :], note)]
 
-    def strips(self, names: Sequence[str], note: Callable[[str], None]) -> list[HouseStrips]:
+    def strips(self, names: Sequence[str], note: Callable[[str], None]) -> list[feature_files.HouseStrips]:
         """The strips of houses, drawn where they are missing."""
         data = Dataset(self.data)
         jobs = (joblib.delayed(self._draw)(n) for n in names if not self._path(data, n).exists())
         for name in joblib.Parallel(n_jobs=self.workers, return_as="generator_unordered")(jobs):
             note(f"drawn: {name}")
-        return [HouseStrips.load(self._path(data, n)) for n in names]
+        return [feature_files.HouseStrips.load(self._path(data, n)) for n in names]
 
     def _path(self, data: Dataset, name: str) -> Path:
         """The file in which the strips of a house are."""
@@ -117,9 +106,12 @@ class StripSource:
 
     def _draw(self, name: str) -> str:
         data = Dataset(self.data)
-        pictures, classes = pictures_of(data, name, self.picture_kind), all_classes(load_catalogue(self.cache))
+        pictures, classes = (
+            pictures_of(data, name, self.picture_kind),
+            feature_files.all_classes(load_catalogue(self.cache)),
+        )
         with drawn_world(data, name, self.cache, pictures) as world:
-            look(world, classes).save(self._path(data, name))
+            feature_files.look(world, classes).save(self._path(data, name))
         return name
 
 
@@ -153,7 +145,7 @@ def digest_at(data: Dataset, name: str, goal_image: str, cache: Path) -> str:
 
 def captured_path(data: Dataset, name: str, goal_image: str, encoder: str, pictures: PictureSettings) -> Path:
     """The file with the features of goal images of a house; `encoder` is a digest."""
-    return feature_path(data.folder / "features", encoder, name + FEATURE_ENDINGS[goal_image], pictures)
+    return feature_files.feature_path(data.folder / "features", encoder, name + FEATURE_ENDINGS[goal_image], pictures)
 
 
 def house_features(
@@ -175,7 +167,7 @@ def house_features(
         pictures = pictures_of(data, name, picture_kind)
         path = captured_path(data, name, goal_image, encoder, pictures)
         source = digest_at(data, name, goal_image, cache)
-        features[name] = load_features(path, encoder=encoder, source=source, pictures=pictures)
+        features[name] = feature_files.load_features(path, encoder=encoder, source=source, pictures=pictures)
     return features
 
 
@@ -184,9 +176,9 @@ def features_of(world: World, encoder: Encoder, goal_image: str = SAME_TIME) -> 
     if isinstance(world.pictures, Traced) or goal_image != SAME_TIME:
         world.render_all()  # kept: they cost minutes a house
     camera, house = CAMERAS_OF[goal_image], world.house.name
-    seen = (world.panorama(node).equirect(EQUIRECT) for node in range(len(world.graph.positions)))
+    seen = (world.panorama(node).equirect(feature_files.EQUIRECT) for node in range(len(world.graph.positions)))
     photographs = (camera.photographed(picture, None, house, node) for node, picture in enumerate(seen))
-    return encode_strips(encoder, (photograph[margin()] for photograph in photographs))
+    return feature_files.encode_strips(encoder, (photograph[feature_files.margin()] for photograph in photographs))
 
 
 @dataclass(frozen=True)
@@ -210,7 +202,7 @@ class Extractor:
 
         def is_there(goal_image: str) -> bool:
             path = captured_path(data, name, goal_image, encoder.digest, pictures)
-            return has_features(path, encoder, digest_at(data, name, goal_image, self.cache), pictures)
+            return feature_files.has_features(path, encoder, digest_at(data, name, goal_image, self.cache), pictures)
 
         return [goal_image for goal_image in dict.fromkeys(self.goal_images) if not is_there(goal_image)]
 
@@ -223,7 +215,9 @@ class Extractor:
             house = house_at(data, name, goal_image, self.cache)
             with drawn_world(data, name, self.cache, pictures, house) as world:
                 path = captured_path(data, name, goal_image, self.encoder.digest, pictures)
-                save_features(path, features_of(world, self.encoder, goal_image), self.encoder, house.digest, pictures)
+                feature_files.save_features(
+                    path, features_of(world, self.encoder, goal_image), self.encoder, house.digest, pictures
+                )
         return f"{name}: {', '.join(missing)}; {pictures.word} pictures of {pictures.size} pixels"
 
 

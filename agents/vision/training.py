@@ -23,17 +23,8 @@ from torch import Tensor, nn
 
 from embodied.agents.common.session import Note, Session, descend
 from embodied.agents.common.weights import Stateful, seeded
+from embodied.agents.vision import encoder as encoders
 from embodied.agents.vision.config import StripTraining, VisionConfig
-from embodied.agents.vision.encoder import (
-    CELL,
-    ENCODER_NETWORKS,
-    STRIP_COLUMNS,
-    Encoder,
-    Network,
-    pool_views,
-    strip_map,
-    whitening,
-)
 from embodied.agents.vision.features import HouseStrips, visible_in_views
 from embodied.agents.vision.lite import Lite, load_imagenet
 from embodied.assets.cache import digest
@@ -75,12 +66,12 @@ class Heads(nn.Module):
         self.view_room = nn.Linear(size, len(ROOM_KINDS))
 
 
-def vision_loss(network: Network, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
+def vision_loss(network: encoders.Network, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
     """Sum of the five losses, and each as a number."""
     half = isinstance(network, Lite)  # bfloat16 halves the time
     with torch.autocast(batch.rgb.device.type, torch.bfloat16, enabled=half):
-        maps = strip_map(network, batch.rgb).float()  # (n, D, 12, 36)
-    views = pool_views(maps, network.peaks)  # (n, 36, D)
+        maps = encoders.strip_map(network, batch.rgb).float()  # (n, D, 12, 36)
+    views = encoders.pool_views(maps, network.peaks)  # (n, 36, D)
     cells = (batch.share.permute(0, 3, 1, 2) >= 8).float()  # (n, C, 12, 36): covers 3 % of the cell
     parts = {
         "cell objects": F.binary_cross_entropy_with_logits(heads.cell_objects(maps), cells) * 10,
@@ -106,8 +97,8 @@ def batches(
         chosen = [where[k] for k in order[start : start + size]]
         rows = []
         for house, i in chosen:
-            turn, mirror = int(rng.integers(STRIP_COLUMNS)), bool(rng.random() < 0.5)
-            rgb = recolour(turn_strip(house.rgb[i], turn * CELL, mirror), shade, rng=rng)
+            turn, mirror = int(rng.integers(encoders.STRIP_COLUMNS)), bool(rng.random() < 0.5)
+            rgb = recolour(turn_strip(house.rgb[i], turn * encoders.CELL, mirror), shade, rng=rng)
             share, rooms, depth = (turn_strip(x[i], turn, mirror) for x in (house.share, house.rooms, house.log_depth))
             rows.append((rgb, share[..., columns], rooms.astype(np.int64), depth.astype(np.float32), house.room[i]))
         rgb, share, rooms, depth, room = map(np.stack, zip(*rows, strict=True))
@@ -144,14 +135,14 @@ def frequent_classes(houses: Sequence[HouseStrips], least: int) -> list[int]:
 
 def train_encoder(
     houses: Sequence[HouseStrips], config: VisionConfig, folder: Path, *, device: str = "cpu", note: Note = print
-) -> tuple[Encoder, list[str]]:
+) -> tuple[encoders.Encoder, list[str]]:
     """The encoder, on the CPU in the end, and the names of the classes that it learned to tell.
 
     Args and errors: as `learn`.
     """
     classes = classes_of(houses, config)
     with seeded(config.seed):
-        network = ENCODER_NETWORKS[config.network]()
+        network = encoders.ENCODER_NETWORKS[config.network]()
         heads = Heads(network.size, len(classes))
     if isinstance(network, Lite):
         load_imagenet(network)
@@ -159,7 +150,7 @@ def train_encoder(
     loss_of = functools.partial(vision_loss, network, heads)
     identity = identity_of("embodied.agents.vision.training")
     learn(houses, classes, config, modules, loss_of, folder, identity, device=device, note=note)
-    return Encoder(network.cpu().eval(), config.network), [houses[0].classes[i] for i in classes]
+    return encoders.Encoder(network.cpu().eval(), config.network), [houses[0].classes[i] for i in classes]
 
 
 def classes_of(houses: Sequence[HouseStrips], config: StripTraining) -> list[int]:
@@ -247,12 +238,12 @@ def _digest_of(houses: Sequence[HouseStrips]) -> str:
     return digest(*(digest(h.name, h.classes, h.rgb.tobytes(), h.share.tobytes()) for h in houses))
 
 
-def whitened(encoder: Encoder, houses: Sequence[HouseStrips]) -> Encoder:
+def whitened(encoder: encoders.Encoder, houses: Sequence[HouseStrips]) -> encoders.Encoder:
     """The encoder with features decorrelated over the views of `houses`.
 
     Raw features are all positive, so any two views have a cosine near one and the target
     similarity of D.1 says little; after whitening it is near zero for different places.
     """
     features = [encoder.encode_strips(h.rgb[i : i + 8]) for h in houses for i in range(0, len(h.rgb), 8)]
-    mean, mix = whitening(torch.from_numpy(np.concatenate(features)).flatten(0, 1))
-    return Encoder(encoder.network, encoder.name, mean, mix)
+    mean, mix = encoders.whitening(torch.from_numpy(np.concatenate(features)).flatten(0, 1))
+    return encoders.Encoder(encoder.network, encoder.name, mean, mix)

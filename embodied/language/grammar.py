@@ -10,26 +10,7 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
-from embodied.language.clauses import (
-    DOWN,
-    LEFT,
-    UP,
-    Clause,
-    Climb,
-    Cross,
-    Enter,
-    Exit,
-    Metres,
-    OfRoom,
-    OfThing,
-    OpenDoor,
-    Past,
-    Referent,
-    RouteInstruction,
-    Turn,
-    room_of,
-    side_of,
-)
+from embodied.language import clauses as meaning
 from embodied.language.lexicon import PASSAGES, ROOM_NOUNS, ROOM_OF_NOUN, Lexicon, Word
 from embodied.language.templates import NOVEL_HABIT, SPOKEN, TEMPLATES, Template
 from embodied.seeds import novel_among, of_novelty
@@ -42,26 +23,26 @@ if TYPE_CHECKING:
 class Phrase:
     """A clause with the noun its speaker chose for the thing in it."""
 
-    clause: Clause
+    clause: meaning.Clause
     word: Word | None = None
 
 
-def kind_of(clause: Clause) -> str:
+def kind_of(clause: meaning.Clause) -> str:
     """The name by which templates know a clause."""
-    if isinstance(clause, Turn):
+    if isinstance(clause, meaning.Turn):
         return {45: "slight", 90: "turn", 180: "around"}[clause.angle]
-    if isinstance(clause, Past):
+    if isinstance(clause, meaning.Past):
         return "past" if clause.side is None else "past_side"
-    if isinstance(clause, Enter):
+    if isinstance(clause, meaning.Enter):
         return "door" if clause.nth else "enter"
-    if isinstance(clause, OpenDoor) and clause.side:
+    if isinstance(clause, meaning.OpenDoor) and clause.side:
         return "open_door_side"
-    if isinstance(clause, Climb):
+    if isinstance(clause, meaning.Climb):
         return "climb_half" if clause.half else "climb"
     return _NAMES[type(clause)]
 
 
-_NAMES = {c: re.sub(r"\B(?=[A-Z])", "_", c.__name__).lower() for c in get_args(Clause)}
+_NAMES = {c: re.sub(r"\B(?=[A-Z])", "_", c.__name__).lower() for c in get_args(meaning.Clause)}
 """'stop_by' for StopBy."""
 _BY_KINDS: dict[tuple[str, ...], tuple[Template, ...]] = {
     kinds: tuple(t for t in TEMPLATES if t.kinds == kinds) for kinds in {t.kinds: None for t in TEMPLATES}
@@ -114,10 +95,10 @@ def _again(phrases: Sequence[Phrase]) -> list[str]:
     befores: list[str] = []
     here: str | None = None
     for p in phrases:
-        kind = room_of(p.clause)
-        same = kind == here and isinstance(p.clause, Enter)
+        kind = meaning.room_of(p.clause)
+        same = kind == here and isinstance(p.clause, meaning.Enter)
         befores.append(("next " if kind in PASSAGES else "other ") if same else "")
-        here = kind if isinstance(p.clause, Enter | OpenDoor | Exit | Cross) else here
+        here = kind if isinstance(p.clause, meaning.Enter | meaning.OpenDoor | meaning.Exit | meaning.Cross) else here
     return befores
 
 
@@ -137,20 +118,20 @@ def _fill(
         "walk": SPOKEN.verbs[0] if rng.random() < speaker.plainness else verbs[int(rng.integers(len(verbs)))],
         "soon": soon[int(rng.integers(len(soon)))],
     }
-    rooms = [(kind, before) for p, before in zip(phrases, again) if (kind := room_of(p.clause)) is not None]
+    rooms = [(kind, before) for p, before in zip(phrases, again) if (kind := meaning.room_of(p.clause)) is not None]
     for name, (kind, before) in zip(("room", "other"), rooms):
         plain, nouns = ROOM_NOUNS[kind][0], own(ROOM_NOUNS[kind])
         slots[name] = before + (plain if rng.random() < speaker.plainness else nouns[int(rng.integers(len(nouns)))])
     for p in phrases:
-        if isinstance(p.clause, Metres):
+        if isinstance(p.clause, meaning.Metres):
             n, many = p.clause.count, "s" * (p.clause.count != 1)
             spelt = SPOKEN.numbers[n] if n < len(SPOKEN.numbers) and (n == 1 or rng.random() < 0.7) else str(n)
             slots |= {"metres": f"{spelt} meter{many}", "steps": f"{spelt} big step{many}"}
-        if isinstance(p.clause, Enter) and p.clause.nth:
+        if isinstance(p.clause, meaning.Enter) and p.clause.nth:
             slots["nth"] = SPOKEN.ordinals[p.clause.nth]
-        if isinstance(p.clause, Climb):
+        if isinstance(p.clause, meaning.Climb):
             slots |= {"way": p.clause.way, "upstairs": f"{p.clause.way}stairs"}
-        if (side := side_of(p.clause)) is not None:
+        if (side := meaning.side_of(p.clause)) is not None:
             slots["side"] = side
         if p.word is not None:
             slots["thing"] = f"the {p.word}"
@@ -239,7 +220,7 @@ def _link(speaker: Speaker, arrived: bool, rng: np.random.Generator) -> str:
 # Reading back -----------------------------------------------------------------------------------
 
 
-def parse(text: str, lexicon: Lexicon) -> RouteInstruction:
+def parse(text: str, lexicon: Lexicon) -> meaning.RouteInstruction:
     """The clauses that a text means; what no template accounts for is passed over.
 
     Raises:
@@ -258,7 +239,7 @@ def parse(text: str, lexicon: Lexicon) -> RouteInstruction:
         raise ValueError(
             f"no part of {text!r} is a route instruction; expected words such as 'turn left and go to the sofa'"
         )
-    return RouteInstruction(tuple(clauses))
+    return meaning.RouteInstruction(tuple(clauses))
 
 
 def normalised(text: str) -> str:
@@ -298,7 +279,7 @@ class _ParsedTemplate:
     length: int
     """Characters it accounts for."""
     slots: dict[str, str]
-    thing: Referent | None
+    thing: meaning.Referent | None
 
 
 def _longest(text: str, lexicon: Lexicon) -> _ParsedTemplate | None:
@@ -336,8 +317,8 @@ def _patterns() -> tuple[_Pattern, ...]:
         "metres": rf"(?P<n>\d+|{_any(SPOKEN.numbers)}) meters?",
         "steps": rf"(?P<n>\d+|{_any(SPOKEN.numbers)}) big steps?",
         "nth": f"(?P<nth>{_any(SPOKEN.ordinals)})",
-        "way": f"(?P<way>{UP}|{DOWN})",
-        "upstairs": f"(?P<way>{UP}|{DOWN})stairs",
+        "way": f"(?P<way>{meaning.UP}|{meaning.DOWN})",
+        "upstairs": f"(?P<way>{meaning.UP}|{meaning.DOWN})stairs",
         "walk": f"(?:{_any(SPOKEN.verbs + SPOKEN.playful)})",
         "soon": f"(?:{_any(SPOKEN.soon)})",
     }
@@ -365,22 +346,28 @@ def _any(words: Iterable[str]) -> str:
     return "|".join(re.escape(w) for w in sorted(words, key=lambda w: (-len(w), w)))
 
 
-def _made(name: str, slots: Mapping[str, str], rooms: Iterator[str], thing: Referent | None) -> Clause:
+def _made(name: str, slots: Mapping[str, str], rooms: Iterator[str], thing: meaning.Referent | None) -> meaning.Clause:
     """The clause that a name of the templates means, of what its slots held: words, kinds of rooms in turn, a thing."""
     if name in ("turn", "slight"):
-        return Turn(slots["side"], 90 if name == "turn" else 45)
+        return meaning.Turn(slots["side"], 90 if name == "turn" else 45)
     if name == "around":
-        return Turn(LEFT, 180)
+        return meaning.Turn(meaning.LEFT, 180)
     if name == "door":
-        return Enter(next(rooms), slots["side"], SPOKEN.ordinals.index(slots["nth"]))
+        return meaning.Enter(next(rooms), slots["side"], SPOKEN.ordinals.index(slots["nth"]))
     if name == "open_door_side":
-        return OpenDoor(next(rooms), slots["side"])
+        return meaning.OpenDoor(next(rooms), slots["side"])
     if name == "metres":
         n = slots["n"]
-        return Metres(SPOKEN.numbers.index(n) if n in SPOKEN.numbers else int(n))
+        return meaning.Metres(SPOKEN.numbers.index(n) if n in SPOKEN.numbers else int(n))
     if name in ("climb", "climb_half"):
-        return Climb(slots["way"], name == "climb_half")
+        return meaning.Climb(slots["way"], name == "climb_half")
     if name == "past_side":
-        return Past(cast(Referent, thing), slots["side"])
+        return meaning.Past(cast(meaning.Referent, thing), slots["side"])
     made: Any = next(c for c, known in _NAMES.items() if known == name)
-    return made(next(rooms)) if issubclass(made, OfRoom) else made(thing) if issubclass(made, OfThing) else made()
+    return (
+        made(next(rooms))
+        if issubclass(made, meaning.OfRoom)
+        else made(thing)
+        if issubclass(made, meaning.OfThing)
+        else made()
+    )
