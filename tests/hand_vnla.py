@@ -6,9 +6,9 @@ import numpy as np
 from hand_worlds import grid_world
 
 from embodied.agents.common.vocabulary import build_vocabulary
+from embodied.agents.learners.vnla import VnlaSettings
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import Split
-from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.study import VnlaAbout, VnlaAgent
 from embodied.kinds.shipped.vnla import VNLA
 from embodied.kinds.task_kind import EnvInputs

@@ -16,9 +16,9 @@ import pytest
 from tqdm import tqdm
 
 from embodied import cli
-from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.hanna.training_config import TrainingConfig
-from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
+from embodied.agents.learners.bandit import BanditConfig
+from embodied.agents.learners.hari import ExecutionConfig, IntentionConfig
 from embodied.agents.vision.config import VisionConfig
 from embodied.assets.materials import finish
 from embodied.cli import doctor

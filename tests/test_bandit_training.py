@@ -11,7 +11,6 @@ import pytest
 import torch
 
 from embodied.agents.bandit import corpus
-from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import CorpusError, Pair, Sizes
 from embodied.agents.bandit.network import (
     TRANSLATOR_REMEDY,
@@ -33,6 +32,7 @@ from embodied.agents.common.session import Session
 from embodied.agents.common.tensors import padded, sampled_choice
 from embodied.agents.common.vocabulary import END_NUMBER, PAD_NUMBER, most_frequent
 from embodied.agents.common.weights import load_weights, read_checkpoint
+from embodied.agents.learners.bandit import BanditConfig
 from embodied.agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.errors import UnableError

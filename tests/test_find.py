@@ -11,10 +11,10 @@ from hand_worlds import grid_world, line_world
 
 from embodied.agents.common.imitation import Supervised
 from embodied.agents.common.vocabulary import build_vocabulary
-from embodied.agents.find.config import FinderConfig
 from embodied.agents.find.network import AROUND, READ, Explorer, SeekNetwork
 from embodied.agents.find.policy import STOP, WORDS, Search, WayMap, costs_of
 from embodied.agents.find.study import Finder, FinderAbout, FindLearner, Labels, new_finder, tasks_in
+from embodied.agents.learners.find import FinderConfig
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import Split
 from embodied.evaluation.evaluate import play

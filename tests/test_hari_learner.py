@@ -15,7 +15,6 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common.imitation import TaskSet
 from embodied.agents.common.tensors import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.weights import CheckpointError
-from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.networks import (
     INTENTIONS,
     HariAgent,
@@ -33,6 +32,7 @@ from embodied.agents.hari.pretraining import train_step as lesson
 from embodied.agents.hari.run import TEST, IntentionRun, counts_of, train, train_step, values
 from embodied.agents.hari.study import RULES, HariStudy, RandomWithBudgets, RuleAgent, RuleMoment
 from embodied.agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, percept
+from embodied.agents.learners.hari import ExecutionConfig, IntentionConfig
 from embodied.agents.studies.engine import run_study
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.envs.hari import Costs, HariEnv

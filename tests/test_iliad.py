@@ -11,7 +11,6 @@ import torch
 from torch import Tensor, nn
 
 from embodied.agents.common.session import descend
-from embodied.agents.iliad.config import LearnerConfig, mixing_at
 from embodied.agents.iliad.protocol import (
     ExecutionScores,
     RequestBatch,
@@ -22,6 +21,7 @@ from embodied.agents.iliad.protocol import (
     reinforce_loss,
 )
 from embodied.agents.iliad.training import IliadProblem, episodes_to, success_rate, train
+from embodied.agents.learners.iliad import LearnerConfig, mixing_at
 from embodied.seeds import stream
 
 silent = lambda line: None

@@ -10,7 +10,6 @@ from hand_worlds import grid_world, line_world
 from embodied.agents.common.tensors import greedy_choice
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.hanna.attention import orientation
-from embodied.agents.iliad.config import LearnerConfig, NavConfig
 from embodied.agents.iliad.nav.run import new_follower
 from embodied.agents.iliad.nav.student import LoopFree, NavEyes, NavStudent, Track
 from embodied.agents.iliad.nav.teacher import (
@@ -31,6 +30,7 @@ from embodied.agents.iliad.nav.world import (
     without_loops,
 )
 from embodied.agents.iliad.training import IliadProblem, success_rate, train
+from embodied.agents.learners.iliad import LearnerConfig, NavConfig
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vln.policy import COPIES
 from embodied.assets.records import ROOM_KINDS

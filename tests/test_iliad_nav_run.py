@@ -9,11 +9,11 @@ import torch
 from hand_data import COMPACT, built, noise_features, small_house
 
 from embodied.agents.common.weights import CheckpointError
-from embodied.agents.iliad.config import LearnerConfig, NavConfig
 from embodied.agents.iliad.nav.run import NavSetup, load_follower
 from embodied.agents.iliad.nav.teacher import GrammarNavTeacher
 from embodied.agents.iliad.study import IliadStudy
 from embodied.agents.iliad.training import train
+from embodied.agents.learners.iliad import LearnerConfig, NavConfig
 from embodied.agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.datasets.store import Dataset

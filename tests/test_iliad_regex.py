@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from embodied.agents.common.tensors import greedy_choice
 from embodied.agents.common.weights import CheckpointError
-from embodied.agents.iliad.config import LearnerConfig, RegexConfig
 from embodied.agents.iliad.regex.data import LEAST_CHANGED, WordTask, made_up, make_data, rules_without_requests
 from embodied.agents.iliad.regex.language import PARTS, templates
 from embodied.agents.iliad.regex.rules import (
@@ -48,6 +47,7 @@ from embodied.agents.iliad.regex.teacher import (
 )
 from embodied.agents.iliad.study import IliadStudy
 from embodied.agents.iliad.training import IliadProblem, train
+from embodied.agents.learners.iliad import LearnerConfig, RegexConfig
 from embodied.agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.seeds import stream

@@ -7,12 +7,12 @@ import math
 
 import pytest
 
-from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.common.settings import RunSettings, ValidatedRunSettings
 from embodied.agents.hanna.training_config import TrainingConfig
-from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
+from embodied.agents.learners.bandit import BanditConfig
+from embodied.agents.learners.hari import ExecutionConfig, IntentionConfig
+from embodied.agents.learners.vnla import VnlaSettings
 from embodied.agents.vision.config import VisionConfig
-from embodied.agents.vnla.config import VnlaSettings
 
 VALIDATED = (TrainingConfig(), ExecutionConfig(), IntentionConfig(), VnlaSettings())
 RUNS = (*VALIDATED, BanditConfig())

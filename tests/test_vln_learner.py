@@ -14,10 +14,10 @@ from hand_worlds import grid_world
 from embodied.agents.common.settings import SHIPPED_ENCODER, SHIPPED_VLN
 from embodied.agents.common.tensors import IGNORE
 from embodied.agents.common.vocabulary import build_vocabulary
+from embodied.agents.learners.vln import FollowerSettings
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import Split
-from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.policy import FollowerOutputs, VlnAbout, VlnAgent, VlnMoment
 from embodied.agents.vln.study import VlnLearner, losses_of, teacher_share
 from embodied.assistants.route_system import build_routes

@@ -15,8 +15,8 @@ from embodied.action_spaces import WORDS
 from embodied.agents.common import imitation
 from embodied.agents.common.imitation import play_with_memory
 from embodied.agents.common.weights import CheckpointError
+from embodied.agents.learners.vnla import RULES
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vnla.config import RULES
 from embodied.agents.vnla.looking import READING, lessons_of, turned
 from embodied.agents.vnla.network import ASK, DONT, MOST_LEFT, NO_ASK, NO_MOVE, STOP, VnlaPercept
 from embodied.agents.vnla.policy import VnlaMoment, _decided, carried_out, for_training

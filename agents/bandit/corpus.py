@@ -23,7 +23,7 @@ from pathlib import Path
 import lxml.etree  # type: ignore[import-untyped]
 import lxml.html  # type: ignore[import-untyped]
 
-from embodied.agents.bandit.config import Sizes
+from embodied.agents.learners.bandit import Sizes
 from embodied.assets.cache import digest, write_bytes, write_json
 from embodied.errors import UnableError
 from embodied.locks import locked

@@ -16,10 +16,10 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.common.tensors import Choice, Rows, greedy_choice, padded
 from embodied.agents.common.vocabulary import END_NUMBER, PAD_NUMBER, Vocabulary
 from embodied.agents.common.weights import load_into, load_weights, save_weights
+from embodied.agents.learners.bandit import BanditConfig
 from embodied.records import Identity
 
 Network = TypeVar("Network", bound=nn.Module)

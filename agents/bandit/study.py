@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import corpus_digest
 from embodied.agents.bandit.ratings import Rater
 from embodied.agents.bandit.training import RATED, TokenizedCorpora, bandit, load_corpus, pretrain, train_critic
 from embodied.agents.common.session import Note
 from embodied.agents.common.weights import read_checkpoint
+from embodied.agents.learners.bandit import BanditConfig
 from embodied.agents.studies.engine import Measured, StudyLearner
 from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
 from embodied.evaluation.tables import Samples

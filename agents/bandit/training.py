@@ -21,13 +21,13 @@ import torch
 from torch import Tensor
 
 from embodied.agents.bandit import network as networks
-from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import corpus_digest, load
 from embodied.agents.bandit.ratings import CLEAN, Rater, corpus_bleu, sentence_bleu
 from embodied.agents.common.session import Note, Session, descend
 from embodied.agents.common.tensors import Decisions, actor_loss, critic_loss, padded, sampled_choice
 from embodied.agents.common.vocabulary import Vocabulary, most_frequent
 from embodied.agents.common.weights import Stateful, weights_digest
+from embodied.agents.learners.bandit import BanditConfig
 from embodied.records import Identity, identity_of
 from embodied.seeds import stream
 

@@ -28,9 +28,9 @@ from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.tensors import choose_sampled
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features, load_into, load_weights, save_weights, seeded
-from embodied.agents.find.config import THINGS, FinderConfig
 from embodied.agents.find.network import READ, Explorer, SeekNetwork
 from embodied.agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, imitation_loss
+from embodied.agents.learners.find import THINGS, FinderConfig
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
 from embodied.agents.vision.encoder import load_encoder

@@ -32,7 +32,7 @@ from torch import Tensor
 
 from embodied.agents.common import imitation
 from embodied.agents.common.imitation import About, SightedAgent
-from embodied.agents.common.session import Progress
+from embodied.agents.common.session import Options, Progress
 from embodied.agents.common.tensors import IGNORE, choose_at, negative_log_likelihood
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features
@@ -300,11 +300,7 @@ def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
 
 
 def train_agent(
-    source: TrainingData,
-    config: TrainingConfig,
-    evaluation: HannaEvaluation,
-    folder: Path,
-    **options: Unpack[imitation.Options],
+    source: TrainingData, config: TrainingConfig, evaluation: HannaEvaluation, folder: Path, **options: Unpack[Options]
 ) -> Progress:
     """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
     houses = config.training_houses or None

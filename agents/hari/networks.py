@@ -12,8 +12,8 @@ import torch
 from torch import Tensor, nn
 
 from embodied.agents.common.weights import load_into, load_weights, save_weights, seeded
-from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.words import SIZES, FeatureWords, Inputs
+from embodied.agents.learners.hari import ExecutionConfig, IntentionConfig
 from embodied.records import Identity
 
 INTENTIONS = ("cur", "goal", "sub", "do", "done")

@@ -23,9 +23,9 @@ from torch import Tensor
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import session as sessions
 from embodied.agents.common.weights import Stateful
-from embodied.agents.hari.config import ExecutionConfig
 from embodied.agents.hari.networks import EncodedDescriptions, Executor, save
 from embodied.agents.hari.words import collate, padded, percept
+from embodied.agents.learners.hari import ExecutionConfig
 from embodied.assistants.descriptions import Describer, dropped
 from embodied.interface import Description, Episode, FindObject, Move, Place, Pose, Task
 from embodied.kinds.shipped.hari import LONGEST_SUBGOAL, described_subgoal

@@ -26,10 +26,10 @@ from embodied.agents.common.session import Options, Progress, Session, descend, 
 from embodied.agents.common.tensors import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.weights import Stateful, checksum_of, load_into, weights_digest
 from embodied.agents.hari import networks
-from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.policy import Choice, policy_of
 from embodied.agents.hari.pretraining import PretrainingData, pretrain
 from embodied.agents.hari.words import feature_words
+from embodied.agents.learners.hari import ExecutionConfig, IntentionConfig
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv

@@ -14,9 +14,9 @@ import numpy as np
 from embodied.agents.common.session import Note
 from embodied.agents.common.weights import weights_digest
 from embodied.agents.hari import run
-from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.networks import INTENTIONS, Executor, HariAgent, load_agent, load_executor
 from embodied.agents.hari.policy import ASKS, DO, DONE, Belief, Reader, action_of, available, carry, consider, policy_of
+from embodied.agents.learners.hari import ExecutionConfig, IntentionConfig
 from embodied.agents.studies.engine import Measured
 from embodied.agents.studies.episodes import JUDGES, EpisodeStudy
 from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables

@@ -12,11 +12,11 @@ from typing import Any
 
 from embodied.agents.common.session import Note
 from embodied.agents.common.weights import read_checkpoint
-from embodied.agents.iliad.config import LearnerConfig
 from embodied.agents.iliad.nav.run import NavSetup
 from embodied.agents.iliad.regex.run import RegexSetup
 from embodied.agents.iliad.training import episodes_to
 from embodied.agents.iliad.training import train as learn
+from embodied.agents.learners.iliad import LearnerConfig
 from embodied.agents.studies.engine import Measured, StudyLearner
 from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
 from embodied.evaluation.tables import Samples

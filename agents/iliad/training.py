@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from embodied.agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate, tasks_of_update
 from embodied.agents.common.weights import Stateful, load_into, origin_of, read_weights, save_weights
 from embodied.agents.iliad import protocol
-from embodied.agents.iliad.config import LearnerConfig, mixing_at
+from embodied.agents.learners.iliad import LearnerConfig, mixing_at
 from embodied.records import Identity, differences, identity_of
 from embodied.seeds import stream
 

@@ -1,4 +1,4 @@
-"""VLN: agents that follow route instructions."""
+"""VLN: agents that follow route instructions; their settings and commands."""
 
 from __future__ import annotations
 
@@ -7,13 +7,52 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from embodied.agents import options
-from embodied.agents.common.settings import SHIPPED_VLN, EvaluationSettings
+from embodied.agents.common import settings
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
-from embodied.agents.vln.config import MEASURES, VLN_SCALES, FollowerSettings
-from embodied.options import Count, Settings
+from embodied.options import Count, Option, Settings
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset
+
+MEASURES = ("success", "spl", "nDTW", "SDTW", "navigation error")
+"""Columns of tables."""
+FORCING = ("teacher", "student", "dagger")
+"""Who acts in an episode of training: the teacher's; the follower's own, sampled; or at first the teacher's,
+then more and more its own (Ross et al. 2011). The label is always the teacher's."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FollowerSettings(settings.ImitationSettings):
+    """How a follower is trained."""
+
+    hidden_size: settings.AtLeastOne = 512
+    """Width of the networks."""
+    dropout: settings.NotAll = 0.2
+    """Dropout rate in training."""
+    forcing: Annotated[str, Option(words=FORCING)] = "dagger"
+    """Who acts in training: 'teacher', 'student' or 'dagger'."""
+    blind: bool = False
+    """Ablation without vision: all features are zero."""
+    wordless: bool = False
+    """Ablation without language: the instruction is empty."""
+    progress_weight: settings.NotNegative = 0.5
+    """Weight of the progress monitor's loss: it predicts which share of the path is left (Ma et al. 2019)."""
+    room_weight: settings.NotNegative = 0.5
+    """Weight of an auxiliary loss: predict the kinds of the current room and of the candidates' rooms."""
+    more_paths: settings.Whole = 0
+    """Additional paths per training house, each worded three times."""
+    least_teacher: settings.Share = 0.0
+    """Lowest share of steps taken by the teacher in 'dagger', reached halfway."""
+    iterations: settings.AtLeastOne = 20_000
+    """Updates of the weights."""
+    batch: settings.AtLeastOne = 64
+    """Episodes per update."""
+    instruction_length: settings.AtLeastOne = 80
+    """Longest instruction, words; the rest is cut."""
+
+
+VLN_SCALES = settings.scales(FollowerSettings, "vln")
+"""'mini': ten minutes of one core, and twenty more where paths are not worded yet; 'paper': for one GPU."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,7 +61,8 @@ class FollowerTraining(options.SightedRun):
 
     config: Annotated[FollowerSettings, Settings(options.TRAINING, VLN_SCALES)]
     evaluation: Annotated[
-        EvaluationSettings, Settings(options.EVALUATION, EvaluationSettings(), skip=("ask_threshold",))
+        settings.EvaluationSettings,
+        Settings(options.EVALUATION, settings.EvaluationSettings(), skip=("ask_threshold",)),
     ]
 
 
@@ -36,7 +76,8 @@ class VlnStudyOptions(options.EpisodeStudyOptions, options.Encoded):
     """Training seeds of all rows but the first."""
     config: Annotated[FollowerSettings, Settings(options.TRAINING, VLN_SCALES, skip=("forcing", "blind", "wordless"))]
     evaluation: Annotated[
-        EvaluationSettings, Settings(options.EVALUATION, EvaluationSettings(), skip=("ask_threshold",))
+        settings.EvaluationSettings,
+        Settings(options.EVALUATION, settings.EvaluationSettings(), skip=("ask_threshold",)),
     ]
 
 
@@ -67,6 +108,6 @@ register_learner(
         study=(VlnStudyOptions, options.study_by("embodied.agents.vln.study:VlnStudy")),
         players=players,
         columns=MEASURES,
-        shipped=SHIPPED_VLN,
+        shipped=settings.SHIPPED_VLN,
     )
 )

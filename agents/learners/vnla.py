@@ -1,4 +1,4 @@
-"""VNLA: agents that ask an advisor within a budget."""
+"""VNLA: agents that ask an advisor within a budget; their settings and commands."""
 
 from __future__ import annotations
 
@@ -8,13 +8,50 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from embodied.agents import options
-from embodied.agents.common.settings import SHIPPED_VNLA, EvaluationSettings
+from embodied.agents.common import settings
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
-from embodied.agents.vnla.config import VNLA_SCALES, VnlaSettings
-from embodied.options import Count, Settings
+from embodied.options import Count, Option, Settings
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset
+
+RULES = ("indirect", "direct", "direct-mute", "algorithm-6")
+"""Rules of play (embodied.envs.vnla)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class VnlaSettings(settings.ImitationSettings):
+    """The defaults are the program's; VNLA_SCALES holds smaller ones."""
+
+    hidden_size: settings.AtLeastOne = 512
+    """Width of the LSTMs of encoder and decoder."""
+    word_embedding: settings.AtLeastOne = 256
+    """Width of an embedded word."""
+    navigation_embedding: settings.AtLeastOne = 32
+    """Width of an embedded navigation action."""
+    ask_embedding: settings.AtLeastOne = 32
+    """Width of an embedded decision to ask."""
+    budget_embedding: settings.AtLeastOne = 16
+    """Width of the embedded number of remaining requests."""
+    dropout: settings.NotAll = 0.5
+    """Dropout rate in training."""
+    iterations: settings.AtLeastOne = 100_000
+    """Updates of the weights; the program's direct-mute agents: 70,000."""
+    looking: settings.Whole = 10_000
+    """How many updates, at the start, only teach to read panoramas."""
+    batch: settings.AtLeastOne = 100
+    """Episodes per update."""
+    blind: bool = False
+    """Ablation without vision: all features are zero."""
+    rules: Annotated[str, Option(words=RULES)] = "indirect"
+    """Rule of play in evaluation. An agent of 'indirect' is trained under 'direct': the advisor's actions replace the
+    learner's while what it said is in force, as in the program (docs/sources.md, S112)."""
+    validate_every: settings.AtLeastOne = 1000
+    """Updates between validations."""
+
+
+VNLA_SCALES = settings.scales(VnlaSettings, "vnla")
+"""'mini': some minutes of one core; 'paper': the program's, for one GPU (docs/sources.md, S113)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +63,7 @@ class VnlaTraining(options.SightedRun):
 
     threads: Count = 2
     config: Annotated[VnlaSettings, Settings(options.TRAINING, VNLA_SCALES)]
-    evaluation: Annotated[EvaluationSettings, Settings(options.EVALUATION, EvaluationSettings())]
+    evaluation: Annotated[settings.EvaluationSettings, Settings(options.EVALUATION, settings.EvaluationSettings())]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +75,7 @@ class VnlaStudyOptions(options.EpisodeStudyOptions, options.Encoded):
     others: Count | None = None
     """Training seeds of all rows but the learned asker's (default: --seeds)."""
     config: Annotated[VnlaSettings, Settings(options.TRAINING, VNLA_SCALES, skip=("rules",))]
-    evaluation: Annotated[EvaluationSettings, Settings(options.EVALUATION, EvaluationSettings())]
+    evaluation: Annotated[settings.EvaluationSettings, Settings(options.EVALUATION, settings.EvaluationSettings())]
 
 
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
@@ -69,6 +106,6 @@ register_learner(
             *("success", "strict success", "room success", "navigation error"),
             *("requests", "ask F1", "oracle success", "steps"),
         ),
-        shipped=SHIPPED_VNLA,
+        shipped=settings.SHIPPED_VNLA,
     )
 )

@@ -21,8 +21,8 @@ from embodied.agents.common.imitation import About, SightedAgent
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.common.weights import check_features
 from embodied.agents.hanna.attention import DotAttend, action_index, candidate_rows, orientation
+from embodied.agents.learners.vln import FollowerSettings
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vln.config import FollowerSettings
 from embodied.assets.records import ROOM_KINDS
 from embodied.geometry import wrap
 from embodied.teachers.shortest import shortest_of

@@ -18,15 +18,15 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from embodied.agents.common import imitation
-from embodied.agents.common.session import Note, Progress
+from embodied.agents.common.session import Note, Options, Progress
 from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.tensors import IGNORE, choose_sampled, negative_log_likelihood
 from embodied.agents.common.vocabulary import build_vocabulary
+from embodied.agents.learners.vln import FollowerSettings
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import study_tables
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import SightedStudy, Split, TrainingData
-from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.policy import VlnAbout, VlnAgent, VlnMoment
 from embodied.assets.cache import digest
 from embodied.assets.catalogue import load_catalogue
@@ -97,7 +97,7 @@ def train_follower(
     config: FollowerSettings,
     evaluation: EvaluationSettings,
     folder: Path,
-    **options: Unpack[imitation.Options],
+    **options: Unpack[Options],
 ) -> Progress:
     """Train, or go on training, the follower of a run folder; other arguments as in agents.common.imitation.train."""
     training = source.split("train", houses=config.training_houses or None)

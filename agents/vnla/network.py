@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from embodied.action_spaces import WORDS
 from embodied.agents.common.tensors import Rows
-from embodied.agents.vnla.config import VnlaSettings
+from embodied.agents.learners.vnla import VnlaSettings
 from embodied.agents.vnla.looking import READING, Looker
 
 ACTIONS = len(WORDS) + 1

@@ -24,16 +24,16 @@ from torch import Tensor
 from embodied.action_spaces import WORDS
 from embodied.agents.common import imitation
 from embodied.agents.common.imitation import About, SightedAgent, Supervised
-from embodied.agents.common.session import Note, Progress, descend, seeded_dropout, set_learning_rate
+from embodied.agents.common.session import Note, Options, Progress, descend, seeded_dropout, set_learning_rate
 from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.tensors import choose_at, negative_log_likelihood
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features
+from embodied.agents.learners.vnla import VnlaSettings
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import study_tables
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import SightedStudy, Split, TrainingData
-from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.looking import lessons_of, reading_loss
 from embodied.agents.vnla.network import VnlaNetwork
 from embodied.agents.vnla.policy import VnlaMoment, VnlaPolicy, for_training
@@ -170,11 +170,7 @@ def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
 
 
 def train_agent(
-    source: TrainingData,
-    config: VnlaSettings,
-    evaluation: EvaluationSettings,
-    folder: Path,
-    **options: Unpack[imitation.Options],
+    source: TrainingData, config: VnlaSettings, evaluation: EvaluationSettings, folder: Path, **options: Unpack[Options]
 ) -> Progress:
     """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
     houses = config.training_houses or None

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from embodied.agents.bandit.config import Sizes
+from embodied.agents.learners.bandit import Sizes
 from embodied.cli.common import note
 from embodied.options import Cached, Option, OutputFolder, Settings, any_path
 

@@ -16,7 +16,6 @@ from embodied.agents.common.session import Note
 from embodied.agents.common.tensors import greedy_choice
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import load_into, load_weights, save_weights, seeded
-from embodied.agents.iliad.config import NavConfig
 from embodied.agents.iliad.nav.student import NAV_SPLITS, LoopFree, NavData, NavEyes, NavStudent
 from embodied.agents.iliad.nav.teacher import (
     LONGEST_DESCRIPTION,
@@ -30,9 +29,10 @@ from embodied.agents.iliad.nav.world import HORIZON, NavMarginal, NavWorld, Trip
 from embodied.agents.iliad.protocol import DescribingTeacher
 from embodied.agents.iliad.training import IliadProblem, asked, drawn, success_rate, successes, teach
 from embodied.agents.iliad.writing import likelihood_loss
+from embodied.agents.learners.iliad import NavConfig
+from embodied.agents.learners.vln import FollowerSettings
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.run import drawings_of, house_features
-from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.policy import FollowerNetwork
 from embodied.agents.vln.study import more_routes
 from embodied.assets.catalogue import load_catalogue

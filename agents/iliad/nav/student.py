@@ -16,9 +16,9 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common.tensors import IGNORE, Choice, greedy_choice, negative_log_likelihood, sampled_choice
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.hanna.attention import orientation
-from embodied.agents.iliad.config import NavConfig
 from embodied.agents.iliad.nav.world import MOVES, NavWalk, Trip, share_left, walk_along, without_loops
 from embodied.agents.iliad.protocol import ExecutionScores
+from embodied.agents.learners.iliad import NavConfig
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vln.policy import COPIES, FollowerNetwork, FollowerOutputs, FollowerViews
 from embodied.assets.cache import digest

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from embodied.agents.iliad.config import RegexConfig
 from embodied.agents.iliad.regex.language import PARTS, RequestTemplate, templates
 from embodied.agents.iliad.regex.rules import RuleShape, compiled, outputs, random_rule, random_shape
+from embodied.agents.learners.iliad import RegexConfig
 from embodied.assets.cache import digest
 from embodied.seeds import stream
 

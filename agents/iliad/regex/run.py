@@ -16,7 +16,6 @@ from embodied.agents.common.session import Note
 from embodied.agents.common.tensors import greedy_choice
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.common.weights import load_into, load_weights, save_weights, seeded
-from embodied.agents.iliad.config import RegexConfig
 from embodied.agents.iliad.protocol import NOTHING, DescribingTeacher
 from embodied.agents.iliad.regex.data import RegexData, WordTask, make_data, rules_without_requests
 from embodied.agents.iliad.regex.rules import (
@@ -32,6 +31,7 @@ from embodied.agents.iliad.regex.rules import (
 from embodied.agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher, RegexMarginal, RegexStudent, RegexWorld
 from embodied.agents.iliad.training import IliadProblem, Network, asked, drawn, successes, teach
 from embodied.agents.iliad.writing import likelihood_loss
+from embodied.agents.learners.iliad import RegexConfig
 from embodied.assets.cache import digest
 from embodied.evaluation.tables import Samples
 from embodied.records import identity_of

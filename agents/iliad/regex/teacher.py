@@ -12,7 +12,6 @@ import torch
 from torch import Tensor
 
 from embodied.agents.common.tensors import Choice, greedy_choice, sampled_choice
-from embodied.agents.iliad.config import RegexConfig
 from embodied.agents.iliad.protocol import NOTHING, DescribingNetworks, ExecutionScores, one_request
 from embodied.agents.iliad.regex.data import Grammar, WordTask
 from embodied.agents.iliad.regex.rules import (
@@ -32,6 +31,7 @@ from embodied.agents.iliad.regex.rules import (
     outputs,
     texts,
 )
+from embodied.agents.learners.iliad import RegexConfig
 
 
 @dataclass(frozen=True)
