@@ -11,21 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from embodied.agents.iliad.regex.language import PARTS, RequestTemplate, templates
+from embodied.agents.iliad.regex.language import PARTS, PHRASES, RequestTemplate, templates
 from embodied.agents.iliad.regex.rules import RuleShape, compiled, outputs, random_rule, random_shape
 from embodied.agents.learners.iliad import RegexConfig
 from embodied.assets.cache import digest
 from embodied.seeds import stream
 
-_WORD_PARTS = {
-    "start": "- - - - - a e i o u re un in de dis ex en over out",
-    "onset": "b c d f g h j k l m n p r s t v w y z bl br ch cl cr dr fl fr gl gr pl pr qu sc sh sk sl sm sn sp st sw "
-    "th tr tw wh",
-    "nucleus": "a e i o u a e i o e i a ea ee ai ou oo ie au io",
-    "coda": "- - - - b d g k l m n p r s t x ck ct ft ld ll mp nd ng nk nt pt rd rk rm rn rt sh sk ss st th",
-    "ending": "- - - s ed er ing ly ness ment able al ous ive ion ist ful less ic y en",
-}
-WORD_PARTS = {name: text.split() for name, text in _WORD_PARTS.items()}
+WORD_PARTS = {name: text.split() for name, text in PHRASES["words"].items()}
 """Of made-up words; '-' is none."""
 SHORTEST, LONGEST_MADE_UP = 3, 10
 """Letters of a word."""

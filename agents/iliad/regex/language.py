@@ -1,4 +1,5 @@
-"""How people put a rule into words: templates for every shape, made from a grammar of (condition, object, operation).
+"""How people put a rule into words: templates for every shape, made from a grammar of (condition, object, operation),
+whose phrases are in phrases.toml.
 
 A template is a request with slots for letters: '{b1}' is the first letter that is looked for,
 '{a2}' the second that is written. 'every [{b1}] becomes [{a1}]' stands for '()(n)()@c' and others.
@@ -7,10 +8,12 @@ A template is a request with slots for letters: '{b1}' is the first letter that 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
-from embodied.agents.iliad.regex.rules import ANY, ANYWHERE, LETTER, SHAPES, START, VOWEL, RuleShape
+from embodied.agents.iliad.regex.rules import ANY, ANYWHERE, LETTER, SHAPES, START, RuleShape
+from embodied.assets.json_file import read_toml
 from embodied.seeds import stream
 
 SPECIFIC = 12
@@ -19,17 +22,7 @@ HELD_OUT = 0.1
 """Share of the vague texts that are held out for validation and test each."""
 SLIP = 0.05
 """Share of templates that are written with a slip."""
-SLIPS: Mapping[str, str] = {
-    "letter": "lettter",
-    "vowel": "vowl",
-    "consonant": "consonent",
-    "beginning": "begining",
-    "replace": "replce",
-    "followed": "folowed",
-    "the word": "word",
-    "should be": "shoud be",
-}
-"""The meant symbol and the written one."""
+PHRASES = read_toml(Path(__file__).with_name("phrases.toml"))
 PARTS = ("train", "validation", "test")
 
 
@@ -74,7 +67,7 @@ def _specific(shape: RuleShape, *, seed: int) -> list[RequestTemplate]:
     sayings = sorted(set(_sayings(shape)))
     for k in rng.permutation(len(sayings))[:SPECIFIC]:
         text = sayings[int(k)]
-        slips = [(right, wrong) for right, wrong in SLIPS.items() if right in text]
+        slips = [(right, wrong) for right, wrong in PHRASES["slips"].items() if right in text]
         if slips and rng.random() < SLIP:
             right, wrong = slips[int(rng.integers(len(slips)))]
             text = text.replace(right, wrong, 1)
@@ -91,22 +84,20 @@ def _part_of(text: str, *, seed: int) -> str:
 # What is looked for -------------------------------------------------------------------------------
 
 
+def _said(part: str, key: str, **slots: str) -> list[str]:
+    """The phrases of a part of phrases.toml for a key, or else those for all others, with their slots filled."""
+    forms = PHRASES[part]
+    return [form.format(**slots) for form in forms[key if key in forms else "else"]]
+
+
 def _one(symbol: str, number: int) -> list[str]:
     """A symbol as a noun phrase; `number` is that of its letter."""
-    slot = f"{{b{number}}}"
-    return {
-        LETTER: [f"[{slot}]", f"the letter [{slot}]", f"an [{slot}]"],
-        ANY: ["a letter", "any letter"],
-        VOWEL: ["a vowel", "any vowel"],
-    }.get(symbol, ["a consonant", "any consonant"])
+    return _said("one", symbol, b=f"{{b{number}}}")
 
 
 def _bare(symbol: str, number: int) -> list[str]:
     """The same without an article."""
-    slot = f"{{b{number}}}"
-    return {LETTER: [f"[{slot}]", f"letter [{slot}]"], ANY: ["letter", "character"], VOWEL: ["vowel"]}.get(
-        symbol, ["consonant"]
-    )
+    return _said("bare", symbol, b=f"{{b{number}}}")
 
 
 def _pair(block: str, one: bool) -> list[str]:
@@ -141,40 +132,12 @@ def _phrases(block: str, one: bool) -> list[str]:
 
 def _operations(replacement: str, what: str) -> list[str]:
     """Imperatives: what to do to `what`."""
-    new = _new(replacement)
-    return {
-        "": [f"delete {what}", f"remove {what}", f"drop {what}", f"take out {what}"],
-        "SS": [f"double {what}", f"repeat {what}", f"write {what} twice"],
-        "LS": [f"add {new} before {what}", f"put {new} in front of {what}", f"insert {new} before {what}"],
-        "SL": [f"add {new} after {what}", f"put {new} behind {what}", f"insert {new} after {what}"],
-    }.get(
-        replacement,
-        [
-            f"replace {what} with {new}",
-            f"change {what} to {new}",
-            f"turn {what} into {new}",
-            f"write {new} instead of {what}",
-            f"substitute {new} for {what}",
-        ],
-    )
+    return _said("operations", replacement, what=what, new=_new(replacement))
 
 
 def _passives(replacement: str, what: str) -> list[str]:
     """Phrases of the operation on `what`."""
-    new = _new(replacement)
-    return {
-        "": [f"{what} should be removed", f"{what} is deleted", f"{what} must go"],
-        "SS": [f"{what} should be doubled", f"{what} is repeated", f"{what} appears twice"],
-        "LS": [f"{what} should get {new} in front", f"{new} is added before {what}"],
-        "SL": [f"{what} should get {new} behind it", f"{new} is added after {what}"],
-    }.get(replacement, [f"{what} should be replaced by {new}", f"{what} becomes {new}", f"{what} is changed to {new}"])
-
-
-def _result(replacement: str) -> str:
-    """The result of the operation, in the fewest words."""
-    return {"": "nothing", "SS": "twice", "LS": f"{_new('L')} + same", "SL": f"same + {_new('L')}"}.get(
-        replacement, _new(replacement)
-    )
+    return _said("passives", replacement, what=what, new=_new(replacement))
 
 
 def _new(replacement: str) -> str:
@@ -187,14 +150,15 @@ def _new(replacement: str) -> str:
 def _sayings(shape: RuleShape) -> Iterator[str]:
     """Everything that the grammar can say for a shape."""
     ones, bares = _phrases(shape.block, True), _phrases(shape.block, False)
-    for condition in _conditions(shape.anchor, ones):
+    for condition in (c for x in ones for c in _said("conditions", shape.anchor, x=x)):
         for operation in _operations(shape.replacement, "it" if len(shape.block) == 1 else "them"):
             yield f"{condition} , {operation}"
     for place in _places(shape, ones, bares):
         yield from _operations(shape.replacement, place)
         yield from _passives(shape.replacement, place)
+    (result,) = _said("result", shape.replacement, new=_new(shape.replacement))
     where = {ANYWHERE: "", START: "start : "}.get(shape.anchor, "end : ")
-    yield from (f"{where}{x} -> {_result(shape.replacement)}" for x in ones)
+    yield from (f"{where}{x} -> {result}" for x in ones)
 
 
 def _vague_sayings(shape: RuleShape) -> Iterator[str]:
@@ -203,14 +167,6 @@ def _vague_sayings(shape: RuleShape) -> Iterator[str]:
         place = _extreme(shape)
         yield from _operations(shape.replacement, place)
         yield from _passives(shape.replacement, place)
-
-
-def _conditions(anchor: str, ones: Sequence[str]) -> list[str]:
-    forms = {
-        ANYWHERE: ("wherever there is {}", "for every occurrence of {}", "each time you see {}"),
-        START: ("if the word starts with {}", "when a word begins with {}", "words beginning with {}"),
-    }.get(anchor, ("if the word ends with {}", "when a word ends in {}", "words ending with {}"))
-    return [form.format(x) for form in forms for x in ones]
 
 
 def _places(shape: RuleShape, ones: Sequence[str], bares: Sequence[str]) -> list[str]:
