@@ -23,7 +23,7 @@ from embodied.generate.program import draw_storeys_of
 from embodied.generate.stairwell import fitting
 from embodied.house.floor_plan import paint_plan
 from embodied.house.house import House, HouseError
-from embodied.house.shapes import footprint, room_at, well_of
+from embodied.house.shapes import footprint, open_floor, opening_of, room_at, well_of
 from embodied.language.clauses import DOWN, UP, Climb
 from embodied.language.grammar import Phrase, parse, say
 from embodied.language.lexicon import lexicon_of
@@ -35,7 +35,7 @@ from embodied.navigation.free_space import EYE
 from embodied.navigation.graph import build_graph, stair_ends
 from embodied.navigation.poses import FreePoses
 from embodied.scene.model import COLLISION, build_spec
-from embodied.scene.stairs import flights_of
+from embodied.scene.stairs import flights_of, railings
 from embodied.seeds import stream
 
 SEEDS = (0, 1)
@@ -73,6 +73,38 @@ def test_rooms_of_three_storeys_are_not_stretched():
         for r in house_of(seed, 3, bare=True).rooms:
             most = 1.4 * ROOM_TABLE[r.kind].area[1]
             assert r.kind in ("hall", "corridor") or shapely.Polygon(r.polygon).area < most, r.id
+
+
+def test_a_stairwell_with_a_gallery_is_open_to_the_storey_above_and_railed_all_around():
+    config = HouseConfig(area=(200, 280), storeys=2, special=("gallery", "L", "bay"))
+    house = generate_house(1, config, stages=BARE)
+    (stair,), void = house.stairs, shapely.Polygon(house.stairs[0].void)
+    low, high = (house.room_by_id[r] for r in stair.rooms)
+    assert void.area > 2 and open_floor(house, low).contains(void)
+    assert open_floor(house, high).intersection(void).area < 1e-6
+    rails = shapely.union_all([shapely.LineString([a[:2], b[:2]]).buffer(0.1) for a, b in railings(house, stair)])
+    head = shapely.Point(stair.path[-1][:2]).buffer(stair.width / 2 + 0.1)
+    assert void.exterior.difference(shapely.union_all([rails, head, well_of(stair).buffer(0.1)])).length < 0.1
+    living = next(r for r in house.rooms if r.kind == "living_room")
+    assert len(living.polygon) > 4
+    assert {*build_graph(house).room_of_node} == {r.id for r in house.rooms}
+    assert House.from_json(house.to_json()) == house
+    assert generate_house(1, HouseConfig(area=(200, 280), special=()), stages=BARE).stairs == ()
+
+
+def test_a_plan_of_ones_own_has_a_room_in_the_shape_of_an_l(tmp_path):
+    plan, file = json.loads(OWN), tmp_path / "plan.json"
+    plan["rooms"] = [r for r in plan["rooms"] if r["kind"] != "stairwell" and not r.get("storey")]
+    plan["rooms"][1]["polygon"] = [[0, 4], [2.4, 4], [2.4, 0], [8, 0], [8, 8.4], [0, 8.4]]
+    file.write_text(json.dumps(plan))
+    house = house_of_plan(load_plan(file), seed=3)
+    (living,) = (r for r in house.rooms if r.kind == "living_room")
+    assert len(living.polygon) == 6 and shapely.Polygon(living.polygon).area == pytest.approx(8 * 8.4 - 2.4 * 4)
+    assert {living.id} == {r for o in house.openings for r in o.rooms if r and r.startswith("living")}
+    plan["rooms"][1]["polygon"][0] = [0.5, 4]
+    file.write_text(json.dumps(plan))
+    with pytest.raises(HouseError, match="a rectangle or an L"):
+        load_plan(file)
 
 
 @pytest.mark.parametrize("storeys", [2, 3])
@@ -128,7 +160,7 @@ def test_one_stands_on_every_tread_and_nobody_falls_from_an_edge(house):
             tread = f.at((k + 0.5) * f.going, 0.0, (k + 1) * f.rise)
             assert ray(tread + [0, 0, 1.9], np.array([0, 0, -1.0])) == pytest.approx(1.9, abs=1e-3)
     upper = house.room_by_id[stair.rooms[1]]
-    z, well = house.storey_of(upper).elevation, well_of(stair)
+    z, well = house.storey_of(upper).elevation, opening_of(stair)
     head = shapely.Point(stair.path[-1][:2]).buffer(stair.width / 2 + 0.1)
     edge = well.exterior.intersection(house.floor(upper).buffer(-0.1)).difference(head)
     for s in rng.uniform(0, edge.length, 40) if edge.length else ():

@@ -11,7 +11,7 @@ from typing import Annotated
 
 from embodied.cli.common import Furnished, Printed, catalogue_of, fetch, show
 from embodied.generate import HouseConfig, generate_house
-from embodied.generate.config import SHAPES
+from embodied.generate.config import SHAPES, SPECIAL
 from embodied.generate.plan_file import house_of_plan, load_plan
 from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS
 from embodied.house.validation import STYLES
@@ -20,7 +20,7 @@ from embodied.seeds import NOVELTIES
 
 KIND = "kind of house (what is not given is drawn from the seed)"
 HOUSE_WORDS = {"shape": SHAPES, "style": STYLES, "weather": WEATHERS, "landscape": LANDSCAPES, "season": SEASONS}
-HOUSE_WORDS["novelty"] = NOVELTIES
+HOUSE_WORDS |= {"novelty": NOVELTIES, "special": SPECIAL}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -327,9 +327,8 @@ def _write_unit(
 ) -> None:
     novelty = config.novelty_of(unit.group)
     language = VOICES[config.language](novelty)
-    house, graph = make_house(
-        config.seed, unit.name, HouseConfig(area=config.area, storeys=config.storeys, novelty=novelty), catalogue
-    )
+    settings = HouseConfig(area=config.area, storeys=config.storeys, special=(), novelty=novelty)
+    house, graph = make_house(config.seed, unit.name, settings, catalogue)
     house_split = {"extra": "train", "ood": "test"}.get(unit.group, unit.group)
     paths: list[tuple[int, ...]] = []
     kind = config.task_kind

@@ -135,7 +135,7 @@ def connect(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> tupl
     for (i, j), wall in walls.items():
         for child, parent in ((i, j), (j, i)):
             cost, kinds = _cost(cells, child, parent), {cells[child].kind, cells[parent].kind}
-            needed = 9 if kinds <= MOVING else ROOM_TABLE[cells[child].kind].wall
+            needed = 9 if kinds <= MOVING else 0 if cells[i].is_with(cells[j]) else ROOM_TABLE[cells[child].kind].wall
             if cost is not None and wall.length >= needed:
                 options[parent].append((cost, child, wall))
     links: list[Link] = []
@@ -186,6 +186,8 @@ def _second_doors(cells: list[Cell], walls: dict[tuple[int, int], SharedWall], l
 
 def _cost(cells: list[Cell], child: int, parent: int) -> float | None:
     c, p = cells[child], cells[parent]
+    if c.is_with(p):
+        return -1.0
     if c.owner is not None:
         return 0.0 if c.owner == parent else None
     if not ROOM_TABLE[p.kind].leads_on and c.kind not in ROOM_TABLE[p.kind].leads_to:

@@ -9,6 +9,7 @@ from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS, HouseError
 from embodied.house.validation import STYLES
 from embodied.seeds import NOVELTIES
 
+SPECIAL = ("L", "bay", "gallery")
 SHAPES = ("rectangle", "L", "T", "U", "cross")
 CHOICES = {
     "weather": WEATHERS,
@@ -69,6 +70,9 @@ class HouseConfig:
     storeys: int | None = None
     """Number of storeys, 1 to 3; `area`, `rooms` and `bedrooms` are of all of them. None: some houses above 110 m2 have
     two, and some above 220 m2 three."""
+    special: tuple[str, ...] | None = None
+    """Rooms that are no boxes, where there is a place for them: L, living and dining room as one; bay, a bay window;
+    gallery, a stairwell that is open to the storey above. None: houses of several storeys may have them."""
     open_plan: bool | None = None
     """Connect kitchen, dining and living room by wide openings."""
     style: str | None = None
@@ -95,6 +99,8 @@ class HouseConfig:
                 raise HouseError(f"area should be a pair (low, high) of m2, got {self.area!r}") from None
             if not AREAS[0] <= low <= high <= AREAS[1]:
                 raise HouseError(f"area should be (low, high) within {AREAS} m2, got {self.area}")
+        if unknown := set(self.special or ()) - set(SPECIAL):
+            raise HouseError(f"special should be some of {SPECIAL}, got {sorted(unknown)}")
         _within("rooms", self.rooms, 2, 20)
         _within("bedrooms", self.bedrooms, 1, 12)
         _within("storeys", self.storeys, 1, 3)

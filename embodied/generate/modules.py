@@ -32,6 +32,12 @@ class Cell:
     """Of a stairwell: its part along one side where one walks on both storeys."""
     least: int = 0
     """Of a stairwell: the depth that this part was asked to have, decimetres."""
+    room: int | None = None
+    """Cells of one number are one room, of a shape that is no rectangle."""
+
+    def is_with(self, other: Cell) -> bool:
+        """True if both are of one room."""
+        return self.room is not None and self.room == other.room
 
 
 @dataclass(frozen=True)

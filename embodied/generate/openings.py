@@ -163,10 +163,12 @@ def _draw_storey(made: _Openings, height: float, open_plan: bool, rng: np.random
     plan = made.plan
     if made.storey == 0:
         _front_door(made, rng)
-    wide = [k for k in plan.links if _is_wide(plan, k)]
+    between = lambda k: frozenset((made.names[k.child], made.names[k.parent]))
+    links = list({between(k): k for k in reversed(plan.links) if len(between(k)) == 2}.values())[::-1]
+    wide = [k for k in links if _is_wide(plan, k)]
     for link in wide:
         _passage(made, link, height, open_plan, rng)
-    doors = sorted((k for k in plan.links if k not in wide), key=lambda k: _is_tiny(plan.cells[k.child]))
+    doors = sorted((k for k in links if k not in wide), key=lambda k: _is_tiny(plan.cells[k.child]))
     for link in doors:
         if not (_is_tiny(plan.cells[link.child]) and _folded_door(made, link, rng)):
             _door(made, link, rng)
@@ -413,10 +415,11 @@ def _windows(made: _Openings, i: int, height: float, rng: np.random.Generator) -
     if kind.glass is None:
         return
     x0, y0, x1, y1 = _metres(c)
-    wanted = kind.glass * (x1 - x0) * (y1 - y0) * float(rng.uniform(0.85, 1.2))
-    glazed = sum(
-        o.head * math.dist(o.a, o.b) for o in made.found if o.rooms[0] == made.names[i] and o.kind == "french_window"
-    )
+    floor = (x1 - x0) * (y1 - y0)
+    is_bay = c.room is not None and c.area > 2 * floor
+    wanted = kind.glass * (c.area if is_bay else floor) * float(rng.uniform(0.85, 1.2))
+    french = [o for o in made.found if o.rooms[0] == made.names[i] and o.kind == "french_window" and not is_bay]
+    glazed = sum(o.head * math.dist(o.a, o.b) for o in french)
     sill, head = kind.sills[bool(rng.random() < 0.4)], kind.head
     left = wanted - 0.6 * glazed
     stretches = sorted(

@@ -1,10 +1,9 @@
 """A floor plan of your own: a JSON file of rooms, from which the usual stages make a furnished house.
 
-    {"rooms": [{"kind": "hall", "polygon": [[0, 0], [1.6, 0], [1.6, 6], [0, 6]]},
-               {"kind": "living_room", "polygon": [[1.6, 0], [7, 0], [7, 6], [1.6, 6]]}]}
+    {"rooms": [{"kind": "hall", "polygon": [[0, 0], [1.6, 0], [1.6, 6], [0, 6]]}, ...]}
 
-Polygons are metres, on a grid of 0.1 m, along the middle of the walls. Each is a rectangle along x and y; an L-shaped
-room is two rectangles of its kind. A house has at least one hall, where one enters. Rooms upstairs have `"storey": 1`;
+Polygons are metres, on a grid of 0.1 m, along the middle of the walls. Each is a rectangle along x and y, or an L or
+another polygon with right angles. A house has at least one hall, where one enters. Rooms upstairs have `"storey": 1`;
 a stair is a room of kind 'stairwell' on each of the storeys that it joins, with the same polygon.
 """
 
@@ -17,6 +16,9 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
+
+import shapely
 
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import RecordError, load_json
@@ -43,6 +45,8 @@ OVERSIZE, USUAL = 3.0, 0.6
 """Times the largest usual area of its kind that the median room may have, and has."""
 DECIDED = ("area", "rooms", "bedrooms", "shape", "storeys")
 """Fields of HouseConfig that a plan leaves no choice of."""
+RECTANGULAR = ("hall", "stairwell", "garage")
+"""Kinds of room that are rectangles."""
 Corners = tuple[tuple[float, float], ...]
 
 
@@ -84,7 +88,7 @@ def load_plan(path: Path) -> FloorPlan:
     _check_size(rooms)
     storeys: list[list[Cell]] = [[] for _ in range(max(r.storey for r in rooms) + 1)]
     for number, room in enumerate(rooms):
-        storeys[room.storey].append(_cell(number, room))
+        storeys[room.storey] += _cells(number, room)
     return plan_of(storeys[0]) if len(storeys) == 1 else _plan_of_storeys(storeys)
 
 
@@ -178,29 +182,34 @@ def house_of_plan(
     return generate_house(seed, config, catalogue, {**STAGES, "rooms": with_plan(plan)})
 
 
-def _cell(number: int, room: PlannedRoom) -> Cell:
-    rect = _rectangle(room.polygon)
-    if rect is None:
+def _cells(number: int, room: PlannedRoom) -> list[Cell]:
+    """The rectangles that a room is made of."""
+    rects, plain = _rectangles(room.polygon), room.kind in RECTANGULAR
+    if not rects or (plain and len(rects) > 1):
         raise HouseError(
-            f"room {number} ({room.kind}) should be a rectangle along x and y with corners on a grid of 0.1 m, at "
-            f"least 0.8 m wide, got {[list(corner) for corner in room.polygon]}; cut other shapes into rectangles"
+            f"room {number} ({room.kind}) should be a rectangle{'' if plain else ' or an L'} along x and y, corners "
+            f"on a grid of 0.1 m, at least 0.8 m wide, got {[list(corner) for corner in room.polygon]}; cut other "
+            "shapes into rectangles"
         )
-    return Cell(room.kind, rect, (rect[2] - rect[0]) * (rect[3] - rect[1]) / GRID**2)
+    part = number if len(rects) > 1 else None
+    return [Cell(room.kind, r, (r[2] - r[0]) * (r[3] - r[1]) / GRID**2, room=part) for r in rects]
 
 
-def _rectangle(polygon: Corners) -> Rect | None:
-    """(x0, y0, x1, y1) in decimetres; None where it is no such rectangle."""
+def _rectangles(polygon: Corners) -> list[Rect]:
+    """(x0, y0, x1, y1) in decimetres of the strips along y of a polygon of right angles; none where it is no such
+    polygon, or one is too narrow."""
     corners = [(round(x * GRID), round(y * GRID)) for x, y in polygon]
     if any(math.dist(p, (x / GRID, y / GRID)) > NOISE for p, (x, y) in zip(polygon, corners, strict=True)):
-        return None
+        return []
     corners = [c for c, before in zip(corners, corners[-1:] + corners) if c != before]
     corners = [c for k, c in enumerate(corners) if not _between(corners[k - 1], c, corners[(k + 1) % len(corners)])]
-    xs, ys = sorted({x for x, _ in corners}), sorted({y for _, y in corners})
-    if len(xs) != 2 or len(ys) != 2 or len(corners) != 4 or len(set(corners)) != 4:
-        return None
-    if min(xs[1] - xs[0], ys[1] - ys[0]) < 8:
-        return None
-    return xs[0], ys[0], xs[1], ys[1]
+    if len(corners) < 4 or not (shape := shapely.Polygon(corners)).is_valid:
+        return []
+    cuts, (_, low, _, high) = sorted({x for x, _ in corners}), shape.bounds
+    strips = [shape.intersection(shapely.box(a, low, b, high)) for a, b in itertools.pairwise(cuts)]
+    rects = [cast(Rect, tuple(map(round, p.bounds))) for p in shapely.get_parts(strips).tolist() if p.area]
+    whole = sum((x1 - x0) * (y1 - y0) for x0, y0, x1, y1 in rects) == shape.area
+    return rects if whole and all(min(x1 - x0, y1 - y0) >= 8 for x0, y0, x1, y1 in rects) else []
 
 
 def _between(a: tuple[int, int], b: tuple[int, int], c: tuple[int, int]) -> bool:

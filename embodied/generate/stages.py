@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import SupportsIndex, TypeVar
 
 import numpy as np
+import shapely
 
 from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.generate.access import MOVING
@@ -25,6 +26,7 @@ from embodied.generate.modules import Cell
 from embodied.generate.novelty import furnishable
 from embodied.generate.openings import Leaves, draw_openings
 from embodied.generate.program import WantedRoom, draw_area, draw_program, draw_storeys_of
+from embodied.generate.special import with_special_rooms
 from embodied.generate.stairwell import SLAB, TALLEST, stair_of
 from embodied.generate.storeys import draw_storeys
 from embodied.generate.walkways import remove_blocking_objects
@@ -112,18 +114,23 @@ def rooms(draft: Draft) -> Draft:
         drawn = draw_plan(footprints, spaces, tries, rng=rng)
         plan = None if drawn is None else drawn[1]
     else:
-        plan = draw_storeys(draft.area, draft.shape, spaces, storeys, tries, rng=rng)
+        gallery = "gallery" in (draft.config.special or ())
+        plan = draw_storeys(draft.area, draft.shape, spaces, storeys, tries, gallery=gallery, rng=rng)
     if plan is None:
         raise DeadEndError(
             f"no walkable plan of {draft.area:.0f} m2 with {len(draft.spaces)} rooms on a {draft.shape} footprint; "
             "widen HouseConfig.area or ask for fewer rooms"
         )
-    return dataclasses.replace(draft, plan=turned(with_short_corridors(plan), rng=rng), spaces=spaces)
+    plan, special = turned(with_short_corridors(plan), rng=rng), draft.config.special
+    if special or (special is None and storeys > 1):
+        plan = with_special_rooms(plan, special, rng=stream(draft.seed, "house", "special", draft.attempt))
+    return dataclasses.replace(draft, plan=plan, spaces=spaces)
 
 
 def with_plan(plan: FloorPlan) -> Stage:
     """A stage that takes the place of `rooms`: this plan in every attempt."""
-    spaces = tuple(WantedRoom(c.kind, c.area) for p in plan.storeys for c in p.cells)
+    cells = [c for p in plan.storeys for k, c in enumerate(p.cells) if not any(map(c.is_with, p.cells[:k]))]
+    spaces = tuple(WantedRoom(c.kind, c.area) for c in cells)
     area = sum(s.area for s in spaces)
     return lambda draft: dataclasses.replace(
         draft, redraws=draft.attempt, plan=plan, spaces=spaces, area=area, shape="rectangle"
@@ -161,38 +168,52 @@ def _bare_house(draft: Draft, palette: Palette, rng: np.random.Generator) -> Hou
         seed=draft.seed,
         name=_title(draft),
         storeys=storeys,
-        rooms=tuple(_bare_room(c, name, palette, k) for k, p in enumerate(plans) for c, name in zip(p.cells, names[k])),
+        rooms=tuple(
+            _bare_room([c for c, own in zip(p.cells, names[k]) if own == name], name, palette, k)
+            for k, p in enumerate(plans)
+            for name in dict.fromkeys(names[k])
+        ),
         openings=openings,
         placements=(),
         lights=(),
         style=palette.style,
         disorder=disorder,
-        stairs=_stairs(plans, names, storeys, rng),
+        stairs=_stairs(draft, names, storeys, rng),
     )
 
 
 def _names(plans: Sequence[FloorPlan]) -> list[tuple[str, ...]]:
-    """'<kind>_<number>' for each cell of each storey."""
+    """'<kind>_<number>' for each cell of each storey; cells of one room share theirs."""
     numbers: defaultdict[str, Iterator[int]] = defaultdict(lambda: itertools.count(1))
-    return [tuple(f"{c.kind}_{next(numbers[c.kind])}" for c in p.cells) for p in plans]
+    storeys: list[list[str]] = [[] for _ in plans]
+    for names, plan in zip(storeys, plans):
+        for c in plan.cells:
+            same = next((name for name, other in zip(names, plan.cells) if c.is_with(other)), None)
+            names.append(same or f"{c.kind}_{next(numbers[c.kind])}")
+    return list(map(tuple, storeys))
 
 
 def _stairs(
-    plans: Sequence[FloorPlan], names: Sequence[tuple[str, ...]], storeys: Sequence[Storey], rng: np.random.Generator
+    draft: Draft, names: Sequence[tuple[str, ...]], storeys: Sequence[Storey], rng: np.random.Generator
 ) -> tuple[Stair, ...]:
     """The stairs between each storey and the next, above each other."""
+    plans, special = _made(draft.plan, "rooms").storeys, draft.config.special
     wells = [(c, name) for p, own in zip(plans, names) for c, name in zip(p.cells, own) if c.kind == "stairwell"]
-    mirrored = bool(rng.random() < 0.5) if wells else False
+    mirrored, open_ = bool(rng.random() < 0.5) if wells else False, special is None or "gallery" in special
     joined = zip(itertools.pairwise(wells), itertools.pairwise(storeys))
-    return tuple(stair_of(low[0], (low[1], high[1]), pair, mirrored) for (low, high), pair in joined)
+    return tuple(stair_of(low[0], (low[1], high[1]), pair, mirrored, open_) for (low, high), pair in joined)
 
 
-def _bare_room(cell: Cell, name: str, palette: Palette, storey: int) -> Room:
-    x0, y0, x1, y1 = (v / 10 for v in cell.rect)
+def _bare_room(cells: Sequence[Cell], name: str, palette: Palette, storey: int) -> Room:
+    x0, y0, x1, y1 = (v / 10 for v in cells[0].rect)
+    polygon: tuple[tuple[float, float], ...] = ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
+    if len(cells) > 1:
+        whole = shapely.union_all([shapely.box(*(v / 10 for v in c.rect)) for c in cells]).normalize().simplify(0)
+        polygon = tuple(shapely.orient_polygons(whole).exterior.coords[:-1])
     return Room(
         id=name,
-        kind=cell.kind,
-        polygon=((x0, y0), (x1, y0), (x1, y1), (x0, y1)),
+        kind=cells[0].kind,
+        polygon=polygon,
         floor_finish=palette.floor,
         wall_finish=palette.walls[0],
         ceiling_finish=palette.ceiling,

@@ -17,6 +17,8 @@ RISERS, SLAB, TALLEST = 16, 0.3, 2.7
 join: risers of 0.17 to 0.19 m."""
 GOINGS, WIDTHS = (0.28, 0.25), (1.2, 1.1, 1.0, 0.9)
 """Largest and smallest depth of a tread, and widths of flights, the best first, metres."""
+GALLERY, LEAST_VOID = 1.1, 1.4
+"""Width of a gallery, and shortest side of the opening that it goes around, metres."""
 LANDING, INNER = 1.0, 0.06
 """Shortest floor before a stair's foot and after its head, and half an inner wall, metres."""
 
@@ -114,12 +116,13 @@ def stairwells(rect: Rect) -> list[Cell]:
     return cells
 
 
-def stair_of(cell: Cell, names: tuple[str, str], storeys: Sequence[Storey], mirrored: bool) -> Stair:
+def stair_of(cell: Cell, names: tuple[str, str], storeys: Sequence[Storey], mirrored: bool, gallery: bool) -> Stair:
     """The stair of a stairwell.
 
     Args:
       names: ids of the room at its foot and of the room at its head.
       storeys: the two that it joins.
+      gallery: whether the room at its foot is open to that at its head, where there is room for it.
     """
     assert cell.floor is not None
     (x0, y0, x1, y1), floor = (tuple(v / 10 for v in r) for r in (cell.rect, cell.floor))
@@ -136,5 +139,18 @@ def stair_of(cell: Cell, names: tuple[str, str], storeys: Sequence[Storey], mirr
 
     low, high = storeys[0].elevation, storeys[1].elevation
     path = tuple((*world(u, v), low + (high - low) * risers / RISERS) for u, v, risers in flights.path)
-    well = shapely.geometry.polygon.orient(shapely.Polygon([world(u, v) for u, v in flights.well])).exterior.coords[:-1]
-    return Stair(f"stair_{names[0].rpartition('_')[2]}", names, rounded(path), flights.width, RISERS, rounded(well))
+    ring = lambda uv: shapely.orient_polygons(shapely.Polygon([world(*p) for p in uv])).exterior.coords[:-1]
+    void = _void(flights, wide - 2 * INNER) if gallery else ()
+    name, well = f"stair_{names[0].rpartition('_')[2]}", rounded(ring(flights.well))
+    return Stair(name, names, rounded(path), flights.width, RISERS, well, rounded(ring(void)) if void else ())
+
+
+def _void(flights: Flights, wide: float) -> tuple[tuple[float, float], ...]:
+    """Corners (u, v) of the opening before a stair, with a gallery around it; none where it would be small."""
+    (end, _, _), (before, _, _) = flights.path[-1], flights.path[-2]
+    arrival = end if end > before else end - flights.width / 2  # one comes up along u, or along v
+    left, far = (GALLERY, flights.approach) if len(flights.well) == 4 else flights.well[2]  # up to all flights
+    right, near = min(wide - GALLERY, arrival), GALLERY
+    if min(right - left, far - near) < LEAST_VOID:
+        return ()
+    return ((left, near), (right, near), (right, far), (left, far))

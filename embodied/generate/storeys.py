@@ -27,11 +27,20 @@ STAIRS = ((9.7, 0.0), (16.5, 170.0), (27.0, 330.0))
 
 
 def draw_storeys(
-    area: float, shape: str, spaces: tuple[WantedRoom, ...], storeys: int, tries: int, *, rng: np.random.Generator
+    area: float,
+    shape: str,
+    spaces: tuple[WantedRoom, ...],
+    storeys: int,
+    tries: int,
+    *,
+    gallery: bool,
+    rng: np.random.Generator,
 ) -> FloorPlan | None:
-    """The ground floor's plan with those above it; None where a storey finds none. `area` and `spaces` are of all."""
+    """The ground floor's plan with those above it; None where a storey finds none. `area` and `spaces` are of all; with
+    a `gallery` the stairwell is large enough for one."""
     own = _by_storey(spaces, storeys)
-    well = WantedRoom("stairwell", float(rng.choice([size for size, house in STAIRS if area >= house])))
+    size = float(rng.choice([size for size, house in STAIRS if area >= house]))
+    well = WantedRoom("stairwell", STAIRS[-1][0] if gallery else size)
     footprints = _footprints(area, shape, [well.area + sum(s.area for s in rooms) for rooms in own], rng)
     drawn = draw_plan(footprints, (*_filling(own[0], footprints[0], well.area), well), tries, rng=rng)
     if drawn is None:

@@ -81,6 +81,11 @@ def paint_plan(
         if o.rooms[0] in ids:
             _draw_opening(sheet, house, o)
     for s in house.stairs:
+        if s.void and s.rooms[1] in ids:
+            a, b, c, d = s.void
+            sheet.polygon(s.void, PAPER)
+            for line in ((a, b, c, d, a, c), (b, d)):  # crossed out, as openings in floors are
+                sheet.line(line, 0.02, SOFT)
         if ids & {*s.rooms}:
             _draw_stair(sheet, s)
     if graph is not None:

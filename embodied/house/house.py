@@ -167,6 +167,8 @@ class Stair:
     well: tuple[tuple[float, float], ...] = ()
     """Corners, counter-clockwise, of the opening in the floor above, metres; below it, nobody walks. Empty: what the
     flight covers."""
+    void: tuple[tuple[float, float], ...] = ()
+    """Corners of a further opening in the floor above, around which there is a gallery; below it, one walks."""
 
 
 @dataclass(frozen=True)
@@ -233,9 +235,10 @@ class House:
         return float(sum(shapely.Polygon(r.polygon).area for r in self.rooms))
 
     def to_json(self) -> str:
-        """Canonical JSON: sorted keys, no blanks; a landscape and a season that are left to the seed are left out."""
+        """Canonical JSON: sorted keys, no blanks; without landscape and season if left to the seed, and empty voids."""
         body = {"schema": SCHEMA, **dataclasses.asdict(self)}
         body["sky"] = {k: v for k, v in body["sky"].items() if v is not None}
+        body["stairs"] = [{k: v for k, v in s.items() if k != "void" or v} for s in body["stairs"]]
         return json.dumps(body, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
     @staticmethod

@@ -49,9 +49,15 @@ def well_of(stair: Stair) -> shapely.Polygon:
     return line.buffer(stair.width / 2 + 0.02, cap_style="flat", join_style="mitre")
 
 
+def opening_of(stair: Stair) -> shapely.Polygon:
+    """All of the opening in the floor above a stair, metres, world."""
+    return well_of(stair).union(shapely.Polygon(stair.void)) if stair.void else well_of(stair)
+
+
 def open_floor(house: House, room: Room) -> shapely.Geometry:
     """The floor between the walls of a room, without what stairs cover and where they leave it open, metres, world."""
-    wells = [well_of(s) for s in house.stairs if room.id in s.rooms]
+    shape = lambda s: opening_of(s) if room.id == s.rooms[1] else well_of(s)
+    wells = [shape(s) for s in house.stairs if room.id in s.rooms]
     return house.floor(room).difference(shapely.union_all(wells)) if wells else house.floor(room)
 
 

@@ -20,7 +20,7 @@ from embodied.assets.json_file import parse_file
 from embodied.assets.records import Asset, MeshPart
 from embodied.geometry import r2
 from embodied.house.house import House, Room
-from embodied.house.shapes import well_of
+from embodied.house.shapes import opening_of
 
 UNCOUNTED_MODULES = (
     "embodied.assets",
@@ -259,7 +259,7 @@ def density_of(asset: Asset) -> float:
 def floor_boxes(house: House, room: Room, thickness: float = 0.2) -> tuple[CollisionBox, ...]:
     """Boxes under the floor of `room`; oblique rooms are covered by boxes up to half a metre beyond."""
     polygon, top = shapely.Polygon(room.polygon), house.storey_of(room).elevation
-    wells = [well_of(s) for s in house.stairs if s.rooms[1] == room.id]
+    wells = [opening_of(s) for s in house.stairs if s.rooms[1] == room.id]
     corners = [*room.polygon, *(c for w in wells for c in w.exterior.coords)]
     polygon = polygon.difference(shapely.union_all(wells)) if wells else polygon
     xs, ys = (sorted({round(c[i], 6) for c in corners}) for i in (0, 1))

@@ -17,7 +17,7 @@ import shapely
 from embodied.assets.built.primitives import Shape, flat, joined, part, quads
 from embodied.assets.records import Finish
 from embodied.house.house import House, Room
-from embodied.house.shapes import well_of
+from embodied.house.shapes import opening_of, well_of
 from embodied.scene import joinery, outdoors, stairs
 from embodied.scene.part import Part
 from embodied.scene.walls import Hole, floor_turn, hole_on, inset, turned_uv, wall_face
@@ -62,9 +62,9 @@ def room_parts(house: House, room: Room, finish: FinishOf) -> list[Part]:
     for stair in house.stairs:
         lower, upper = (house.room_by_id[r] for r in stair.rooms)
         if room.storey == lower.storey:
-            ceiling_area = ceiling_area.difference(well_of(stair))
+            ceiling_area = ceiling_area.difference(opening_of(stair))
         if room.storey == upper.storey:
-            floor_area = floor_area.difference(well_of(stair))
+            floor_area = floor_area.difference(opening_of(stair))
     turn = floor_turn(house)
     parts = [
         _part(f"{room.id}/floor", "floor", room, finish(room.floor_finish), turned_uv(flat(floor_area, z0), turn)),

@@ -12,7 +12,7 @@ import shapely
 from embodied.assets.built.primitives import Shape, bar, box, extruded, part, quads
 from embodied.assets.records import Finish
 from embodied.house.house import House, Stair
-from embodied.house.shapes import well_of
+from embodied.house.shapes import opening_of
 from embodied.scene.collision import CollisionBox
 from embodied.scene.part import Part
 
@@ -88,7 +88,7 @@ def stair_parts(house: House, stair: Stair, finish: Callable[[str], Finish]) -> 
         if base is not None:
             faces += [_upright(q, p, base, z - TREAD) for p, q in _open_edges(house, stair, polygon)]
     ceiling, floor = house.storey_of(room).elevation + house.storey_of(room).height, house.storey_of(upper).elevation
-    ring = np.asarray(shapely.geometry.polygon.orient(well_of(stair)).exterior.coords)
+    ring = np.asarray(shapely.geometry.polygon.orient(opening_of(stair)).exterior.coords)
     edges = part(finish(room.wall_finish), quads([_upright(b, a, ceiling, floor) for a, b in itertools.pairwise(ring)]))
     rails = [_rail(a, b) for a, b in railings(house, stair)]
     meshes = {
@@ -174,7 +174,7 @@ def railings(house: House, stair: Stair) -> list[tuple[np.ndarray, np.ndarray]]:
     arriving = [head.at(head.length + x, 0.0)[:2] for x in (-0.1, 0.1)]
     inside, z = house.floor(upper).buffer(-0.02), house.storey_of(upper).elevation
     gap = shapely.LineString(arriving).buffer(stair.width / 2, cap_style="flat")
-    lines += [((*p, z), (*q, z)) for p, q in _pieces(well_of(stair).buffer(ASIDE, join_style="mitre"), inside, gap)]
+    lines += [((*p, z), (*q, z)) for p, q in _pieces(opening_of(stair).buffer(ASIDE, join_style="mitre"), inside, gap)]
     return [(np.asarray(p, float), np.asarray(q, float)) for p, q in lines]
 
 

@@ -18,7 +18,7 @@ import shapely
 
 from embodied.assets.records import Asset
 from embodied.house.house import DOORS, House, Opening, Room, Stair
-from embodied.house.shapes import well_of
+from embodied.house.shapes import opening_of
 from embodied.navigation.free_space import LOW
 
 Params = tuple[tuple[str, str | float], ...]
@@ -331,12 +331,12 @@ def room_space(house: House, room: Room) -> RoomSpace:
             keepouts.extend(_opening_keepouts(wall, s0, s1, o, room, storey.elevation, floor.area))
             if o.kind in DOORS:
                 entries.append(wall.point((s0 + s1) / 2, radius + 0.1))
-    wells = [well_of(s) for s in house.stairs if s.rooms[0] == room.id]
+    wells = [opening_of(s) for s in house.stairs if s.rooms[0] == room.id]
     flights = [
         b
         for stair in house.stairs
         if room.id in stair.rooms
-        for b in _stair_keepouts(stair, storey.elevation, storey.height)
+        for b in _stair_keepouts(stair, stair.rooms[1] == room.id, storey.elevation, storey.height)
     ]
     origin = (x0 - WALK_CELL, y0 - WALK_CELL)
     shape = (int((y1 - y0) / WALK_CELL) + 3, int((x1 - x0) / WALK_CELL) + 3)
@@ -454,10 +454,12 @@ def _leaf(wall: Wall, s0: float, s1: float, o: Opening) -> Box:
     return box(x + dx * width / 2, y + dy * width / 2, width, 0.05, math.atan2(dy, dx), 0.0, 2.0)
 
 
-def _stair_keepouts(stair: Stair, z: float, height: float) -> list[Box]:
+def _stair_keepouts(stair: Stair, upstairs: bool, z: float, height: float) -> list[Box]:
     boxes, path = [], stair.path
-    if len(stair.well) == 4:  # with what lies between two flights
-        (x0, y0), (x1, y1) = np.min(stair.well, axis=0), np.max(stair.well, axis=0)
+    for ring in (stair.well, stair.void if upstairs else ()):
+        if len(ring) != 4:  # else with what lies between two flights
+            continue
+        (x0, y0), (x1, y1) = np.min(ring, axis=0), np.max(ring, axis=0)
         boxes.append(box((x0 + x1) / 2, (y0 + y1) / 2, x1 - x0, y1 - y0, 0.0, z, z + height))
     for (ax, ay, _), (bx, by, _) in itertools.pairwise(path):
         length = math.hypot(bx - ax, by - ay)
