@@ -1,4 +1,4 @@
-"""Doors, drawers and lids of furniture: found in its mesh by one rule, with the inside that they close.
+"""Doors, drawers and lids of furniture, and curtains: found in its mesh by one rule, with the inside that they close.
 
 A front is a separate piece of the mesh, or several that belong together, which nothing covers and which carries one or
 two handles. With its handle near one side it is a door, hung at the other; with its handle in the middle a drawer, or,
@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,17 +20,18 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from embodied.assets.built.parametric import PLAIN
-from embodied.assets.built.primitives import Shape, box, cylinder, lathe, part, tube
+from embodied.assets.built.primitives import box, lathe, part, tube
 from embodied.assets.records import Finish, MeshPart
 from embodied.assets.rows import DATA, Row, read_json
 
 OPEN = "open/"
 """Start of the params of a placement that say how far its parts are open: ('open/left_door', 0.7)."""
-_ROWS = read_json(DATA / "opening.json")
-OPENING_CLASSES = frozenset(_ROWS)
+OPENING_ROWS = read_json(DATA / "opening.json")
+OPENING_CLASSES = frozenset(OPENING_ROWS)
 """Classes in whose models moving parts are looked for. A row may have a "kind": "flap" (doors hang at their lower edge
-where the handle is in the middle), "round" or "lid"; "only_doors" where what looks like a drawer is fixed; a "basin"
-that reaches so many metres below the upper edge of a front; the "skin" of its inside; and what it "holds"."""
+where the handle is in the middle), "round", "lid" or "curtain"; "only_doors" where what looks like a drawer is fixed;
+a "basin" that reaches so many metres below the upper edge of a front; the "skin" of its inside; and the classes of what
+it "holds", in "drawers" where these hold something else (embodied.generate.contents)."""
 FULL_TURN = {"door": math.pi / 2, "flap": 1.45, "lid": 1.5}
 """Radians at openness 1; a drawer comes out by PULL of its depth."""
 PULL = 0.75
@@ -47,7 +47,6 @@ GRIP, OFF_CENTRE = 0.007, 0.25
 """Metres that handles stand out at least, and the distance of a door's from the middle of its front, in widths."""
 RIM, BACK, STEP = 0.014, 0.02, 0.34
 """Metres between an inside and the edge of its front, and the back of the thing, and about between shelves."""
-TINTS = ("plate/white", "plate/blue", "plate/sand", "soap/green", "mug/red")
 FIXED, WITHIN = -1, -2
 XZ = [0, 2]
 Corners = tuple[np.ndarray, np.ndarray]
@@ -59,29 +58,36 @@ class MovingPart:
     """A door, drawer or lid, in the frame of its thing."""
 
     name: str
-    """'door', 'left_door', 'door_2', 'drawer', 'drawer_1' (from below), 'lid'; unique in its thing."""
+    """'door', 'left_door', 'door_2', 'drawer', 'drawer_1' (from below), 'lid', 'left_half'; unique in its thing."""
     kind: str
-    """'door', 'flap', 'drawer' or 'lid'."""
+    """'door', 'flap', 'drawer', 'lid' or 'curtain': half of a pair, which slides from the side to the middle."""
     axis: np.ndarray
-    """(3,) unit: a drawer's way out, or what it turns about, right-handed."""
+    """(3,) unit: the way in which it slides, or what it turns about, right-handed."""
     origin: np.ndarray
     """(3,) a point that its axis goes through, metres."""
     reach: float
-    """How far openness 1 is: radians, of drawers metres."""
+    """How far openness 1 is: radians, of what slides metres."""
     box: np.ndarray
     """(2, 3) lowest and highest corner of the front, without its handle."""
     handle: np.ndarray
     """(2, 3) likewise of the handle; of what has none, of where one would take hold."""
     inside: np.ndarray
-    """(2, 3) likewise of what it closes; a lid closes nothing."""
+    """(2, 3) likewise of what it closes; lids and curtains close nothing."""
     pieces: np.ndarray
     """Numbers of the connected pieces of the mesh that it consists of."""
     cut: bool
     """True where the thing must be cut open behind it."""
+    floors: tuple[float, ...] = ()
+    """z of what things can lie on behind it, or in it, upwards, and last of what is above; none where it is full."""
+
+    @property
+    def slides(self) -> bool:
+        """True for what does not turn."""
+        return self.kind in ("drawer", "curtain")
 
     def turn(self, openness: float) -> tuple[np.ndarray, np.ndarray]:
         """(3, 3) rotation and (3,) metres that bring it from closed to open: rotation @ point + metres."""
-        if self.kind == "drawer":
+        if self.slides:
             return np.eye(3), self.axis * (openness * self.reach)
         (x, y, z), angle = self.axis, openness * self.reach
         cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -129,10 +135,11 @@ def taken_apart(object_class: str, parts: tuple[MeshPart, ...]) -> TakenApart | 
     Args:
       parts: the meshes of a thing that is closed, in its own frame.
     """
-    if (row := _ROWS.get(object_class)) is None:
+    if (row := OPENING_ROWS.get(object_class)) is None:
         return None
     s = _Pieces.of(parts)
-    moving = _named(_lids(s) if row.get("kind") == "lid" else _fronts(s, row))
+    special = {"lid": _lids, "curtain": _curtains}.get(row.get("kind"))
+    moving = _named(special(s) if special else _fronts(s, row))
     if not moving:
         return None
     label = np.full(len(s.low), FIXED)
@@ -151,6 +158,8 @@ def taken_apart(object_class: str, parts: tuple[MeshPart, ...]) -> TakenApart | 
     for k, (m, holds) in enumerate(zip(moving, held, strict=True)):
         empty = not (holds & ((s.high - s.low) > 0.5 * np.ptp(m.inside, axis=0))[:, :2].all(1)).any()
         liner, own = _furnished(m, row, finish, empty) if m.cut else ([], [])
+        if m.cut and empty and m.kind in ("door", "drawer") and row.get("kind") != "round":
+            moving[k] = dataclasses.replace(m, floors=_floors(m))
         within += liner
         meshes[m.name] = (*_where(parts, labels, k), *own)
     return TakenApart(parts, tuple(moving), labels, holes, tuple(fixed), tuple(within), meshes)
@@ -344,14 +353,35 @@ def _lids(s: _Pieces) -> list[MovingPart]:
     return [MovingPart("lid", "lid", axis, hinge, FULL_TURN["lid"], front, handle, none, pieces, False)]
 
 
+def _curtains(s: _Pieces) -> list[MovingPart]:
+    """The halves of a pair of curtains, each with its rings; none where they do not hang on both sides."""
+    size, low, high = s.high - s.low, s.low.min(0), s.high.max(0)
+    middle, rings = (low[0] + high[0]) / 2, (size < [0.006, 0.06, 0.06]).all(1)
+    halves = []
+    for side in (-1, 1):
+        own = np.where(side > 0, s.low[:, 0] > middle, s.high[:, 0] < middle)
+        sheets = own & (size[:, 2] > 0.5 * (high - low)[2])
+        if not sheets.any():
+            return []
+        box = np.array([s.low[sheets].min(0), s.high[sheets].max(0)])
+        edge, pieces = box[(side < 0) * 1, 0], np.flatnonzero(own & (sheets | rings))
+        grip = np.array([[edge - 0.02, box[0, 1], box[0, 2] + 1.0], [edge + 0.02, box[0, 1] + 0.02, box[0, 2] + 1.1]])
+        way, none = np.array([-1.0 * side, 0, 0]), box[[1, 1]]
+        halves.append(
+            MovingPart("half", "curtain", way, box.mean(0), abs(edge - middle), box, grip, none, pieces, False)
+        )
+    return halves
+
+
 def _named(parts: Sequence[MovingPart]) -> list[MovingPart]:
     """The parts in order, with names: what is alone has no number, two doors beside each other are left and right."""
     out = []
-    for word, kinds in (("door", ("door", "flap")), ("drawer", ("drawer",)), ("lid", ("lid",))):
+    words = (("door", ("door", "flap")), ("drawer", ("drawer",)), ("lid", ("lid",)), ("half", ("curtain",)))
+    for word, kinds in words:
         some = sorted((p for p in parts if p.kind in kinds), key=lambda p: (round(p.box[0, 2], 2), p.box[0, 0]))
         names = [word] if len(some) == 1 else [f"{word}_{k + 1}" for k in range(len(some))]
-        if len(some) == 2 and word == "door" and some[0].box[1, 0] < some[1].box[0, 0] + 0.01:
-            names = ["left_door", "right_door"]
+        if len(some) == 2 and word in ("door", "half") and some[0].box[1, 0] < some[1].box[0, 0] + 0.01:
+            names = [f"left_{word}", f"right_{word}"]
         out += [dataclasses.replace(p, name=name) for p, name in zip(some, names, strict=True)]
     return out
 
@@ -426,35 +456,17 @@ def _furnished(m: MovingPart, row: Row, finish: Finish, empty: bool) -> tuple[li
     boards = boards_of(m)
     built = [part(skin, *(box(p, q, 0.001) for p, q in boards))] if boards and empty else []
     if m.kind == "drawer":
-        return inside, [*built, *_stored(m, row, [z0 + 0.011, z1])]
+        return inside, built
     if m.kind == "flap":
         wires = [(y, z) for y in np.linspace(y0 + 0.03, y1 - 0.02, 9) for z in z0 + (z1 - z0) * np.array([0.3, 0.65])]
         inside.append(part(PLAIN["steel"], *(tube([(x0, y, z), (x1, y, z)], 0.003, 5) for y, z in wires)))
-    stored = _stored(m, row, [z0, *(float(high[2]) for _, high in boards), z1]) if empty else []
-    return [*inside, *built, *stored], []
+    return [*inside, *built], []
 
 
-def _stored(m: MovingPart, row: Row, floors: Sequence[float]) -> list[MeshPart]:
-    """Folded clothes, crockery or food that lie on floors, of which the last is the ceiling; the same in the same
-    thing."""
-    if "holds" not in row:
-        return []
-    (x0, y0, _), (x1, y1, _) = m.inside
-    bowl = [(0, 0), (0.06, 0), (0.105, 0.03), (0.1, 0.03), (0.055, 0.008), (0, 0.008)]
-    wide, shapes = {
-        "cloth": (0.24, [box([-0.085, -0.11, 0.032 * k], [0.085, 0.11, 0.032 * k + 0.03], 0.012) for k in range(4)]),
-        "crockery": (0.24, [lathe(bowl, 16).moved(z=0.012 * k) for k in range(5)]),
-        "food": (0.1, [cylinder(0.034, 0, 0.2, 0.012)]),
-    }[row["holds"]]
-    things: dict[str, list[Shape]] = {}
-    for k, (low, high) in enumerate(itertools.pairwise(floors)):
-        spots = np.linspace(x0, x1, max(1, int((x1 - x0) / wide)) + 1)
-        for i, x in enumerate((spots[1:] + spots[:-1]) / 2):
-            chosen = (7 * i + 5 * k + int(1e3 * x1)) % 5
-            fits = [s for s in shapes if s.vertices[:, 2].max() < high - low - 0.03]
-            at = (float(x), (y0 + y1) / 2 - 0.04, low)
-            things.setdefault(TINTS[chosen], []).extend(s.moved(*at) for s in fits[: max(chosen, len(floors) == 2)])
-    return [part(PLAIN[tint], *made) for tint, made in things.items() if made]
+def _floors(m: MovingPart) -> tuple[float, ...]:
+    """As MovingPart.floors, of one that is empty."""
+    low, high = m.inside[:, 2].tolist()
+    return (low + 0.011, high) if m.kind == "drawer" else (low, *(float(top[2]) for _, top in boards_of(m)), high)
 
 
 def boards_of(m: MovingPart) -> list[Corners]:

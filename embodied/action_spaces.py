@@ -140,13 +140,15 @@ def door_actions(o: interface.Observation) -> dict[str, interface.Action]:
 
 
 def doors_moved(step: interface.Step, graph: NavGraph, closed: frozenset[str]) -> frozenset[str]:
-    """Doors that a step opened or closed; a move opens those that it goes through.
+    """Doors, or parts of furniture, that a step opened or closed; a move opens those that it goes through.
 
     Args:
       closed: the doors that were closed before.
     """
     if not isinstance(step.action, interface.Move | interface.Open | interface.Close):
         return frozenset()
+    if step.moved:
+        return frozenset(step.moved)
     here, there = step.pose.node, step.candidate_nodes[step.action.candidate]
     if isinstance(step.action, interface.Close):
         return frozenset(graph.doors.get((min(here, there), max(here, there)), ())) - closed

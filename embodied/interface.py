@@ -633,7 +633,7 @@ class Situation:
     extras: Any = None
     """The kind's own part: a record of what else its assistant knows (embodied/envs)."""
     closed: frozenset[str] = frozenset()
-    """Doors that are closed now."""
+    """Doors that are closed now, and parts of furniture that are open."""
 
 
 # What is written down ---------------------------------------------------------------------------
@@ -659,6 +659,8 @@ class Step:
     """HARI: the cost of this step, shaping excluded; Ask-v0 and with people: the price of the question."""
     seconds: float | None = None
     """When it was taken, since the episode began; None where no person took part."""
+    moved: tuple[str, ...] = field(default=(), metadata={"unless_default": True})
+    """Parts of furniture that it opened or closed."""
 
 
 @dataclass(frozen=True)

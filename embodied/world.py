@@ -17,6 +17,7 @@ from embodied.assets.cache import default_cache, digest
 from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.assets.decoding import load_record, save_record
+from embodied.generate.contents import contents, stocked
 from embodied.house.house import HINGED, House
 from embodied.house.moment import Moment, RigidPose, apart
 from embodied.house.validation import load_lit_house
@@ -96,6 +97,8 @@ class World:
         self._bodies: dict[str, tuple[Part, ...]] = {}
         self._followed: mujoco.MjModel | None = None
         self._lender: World | None = None
+        self._alone = False
+        self._watcher: Renderer | None = None
         self._states: dict[tuple[tuple[str, float], ...], Self] = {}
         self._lamps: tuple[tuple[bool, ...], Mapping[str, str]] = (), {}
         self._recent = functools.lru_cache(maxsize=PANORAMAS_KEPT)(self._load)
@@ -135,7 +138,7 @@ class World:
     @functools.cached_property
     def openable(self) -> tuple[str, ...]:
         """Names of all that `open` takes."""
-        doors = (o.id for o in self.house.openings if o.kind in HINGED and o.leaf_finish is not None)
+        doors = (o.id for o in self.house.openings if o.opens)
         furniture = ((p.id, apart(self.catalogue.mesh, p)) for p in self.house.placements)
         return (*doors, *(f"{thing}/{m.name}" for thing, whole in furniture if whole for m in whole.moving))
 
@@ -242,11 +245,11 @@ class World:
         return world
 
     def with_doors(self, openness: Mapping[str, float]) -> Self:
-        """The house with some doors opened or closed, otherwise at rest: a world of its own, in the same light, which
-        this one keeps and closes; itself without any. Without light, what is seen there is kept on disk.
+        """The house with some doors, windows or parts of furniture opened or closed, otherwise at rest: a world of its
+        own, in the same light, which this one keeps and closes; itself without any.
 
         Args:
-          openness: by opening, 0 (closed) to 1 (a right angle).
+          openness: as Moment.openness.
 
         Raises:
           ValueError: as `show`.
@@ -260,8 +263,11 @@ class World:
             graph = dataclasses.replace(self.graph, closed=closed_doors(now))
             made_of = self.catalogue, graph, self.cache, self.pictures
             if self.pictures.quality is None:
-                world = type(self)(now, *made_of)
-                world._lender = self
+                world = type(self)(stocked(now, self.catalogue), *made_of)
+                if {*openness} <= {o.id for o in self.house.openings if o.kind in HINGED}:
+                    world._lender = self
+                else:
+                    world._alone = True
             else:
                 world = type(self)(self.house, *made_of)
                 world._bake = self.baked()
@@ -274,7 +280,7 @@ class World:
     def _bring_up_to_date(self, slack: float = 0.0) -> None:
         """Draw the moment from now on."""
         self._recent.cache_clear()
-        for name in ("_poses", "parts"):
+        for name in ("_poses", "parts", "shown", "owners", "_classes"):
             self.__dict__.pop(name, None)
         if self.pictures.quality is None or self.moment.is_rest:
             if self._renderer is not None:
@@ -292,7 +298,8 @@ class World:
         patches = [(p.page, p.row, p.column, p.picture) for p in drawn.patches]
         if anew:
             overlay = gloss_of(moving.bake, moving=moving) if _reflects(self.pictures) else None
-            renderer.replace(moving.lit, moving.moving, (*self.owners, *self._bodies, *moving.people), overlay)
+            ids = (*self.owners, *self._bodies, *moving.people, *moving.contents)
+            renderer.replace(moving.lit, moving.moving, ids, overlay)
         renderer.change(drawn.corners, patches)
 
     def _light_for_moment(self) -> bool:
@@ -328,24 +335,30 @@ class World:
         return self.house.name
 
     @functools.cached_property
+    def shown(self) -> House:
+        """The house as it is now, with what lies in furniture that was opened."""
+        return self.house if self.moment.is_rest else stocked(self.moment.applied(self.house), self.catalogue)
+
+    @functools.cached_property
     def parts(self) -> tuple[Part, ...]:
         """Everything visible in the house as it is now, as meshes."""
-        return house_parts(self.moment.applied(self.house), self.catalogue)
+        return house_parts(self.shown, self.catalogue)
 
     @functools.cached_property
     def owners(self) -> tuple[str, ...]:
-        """Instance id i + 1 belongs to owners[i]."""
-        return owners(self.house)
+        """Instance id i + 1 belongs to owners[i]; where things lie in open furniture, the ids after theirs differ."""
+        return owners(self.house if self.pictures.quality else self.shown)
 
     @property
     def classes(self) -> tuple[str, ...]:
         """The class of each instance id: `world.classes[view.ids[y, x]]` is what a pixel shows."""
-        moving = ["person" for _ in self._moving.people] if self._moving is not None else ()
+        m = self._moving
+        moving = () if m is None else (*("person" for _ in m.people), *m.contents.values())
         return (*self._classes, *("body" for _ in self._bodies), *moving)
 
     @functools.cached_property
     def _classes(self) -> tuple[str, ...]:
-        return instance_classes(self.house)
+        return instance_classes(self.house if self.pictures.quality else self.shown)
 
     @functools.cached_property
     def _poses(self) -> FreePoses:
@@ -415,7 +428,7 @@ class World:
             return shared
         if self._renderer is None:
             overlay = gloss_of(self.baked()) if _reflects(self.pictures) else None
-            house = self.house if self.pictures.quality else self.moment.applied(self.house)
+            house = self.house if self.pictures.quality else self.shown
             lit = self.baked().lit if self.pictures.quality else None
             self._renderer = Renderer(house, self.catalogue, size=self.pictures.size, lit=lit, overlay=overlay)
             self._drawn = house
@@ -488,10 +501,15 @@ class World:
 
     def sightings(self, node: int) -> tuple[Sighting, ...]:
         """The objects that can be seen from a node, the largest in view first. Needs no panoramas."""
-        if self._lender is not None or not self.moment.is_rest:
-            seen = self.renderer.seen(self.graph.positions[node], FACE)
-            return sightings_table([seen], len(self.house.placements)).at(0, self.house)
-        return self._sightings.at(node, self.house)
+        if self._alone and self._watcher is None:
+            self._watcher = Renderer(self.house, self.catalogue, size=FACE, colours=False)
+        if self._watcher is None and self._lender is None and self.moment.is_rest:
+            return self._sightings.at(node, self.house)
+        now, renderer = self.shown if self.moment.open_parts(self.house) else self.house, self._watcher or self.renderer
+        depth, ids = renderer.seen(self.graph.positions[node], FACE)
+        number = {p.id: k + 1 for k, p in enumerate(now.placements)}
+        numbers = np.array([0, *(number.get(name, 0) for name in renderer.owners)], np.int32)
+        return sightings_table([(depth, numbers[ids])], len(number)).at(0, now)
 
     def render_all(self, progress: bool = False) -> Path:
         """Draw the panoramas of all nodes into the file, unless a whole one is there; returns its path."""
@@ -509,9 +527,10 @@ class World:
 
     def close(self) -> None:
         """Free the renderer and the file; a later use opens them again."""
-        if self._renderer is not None:
-            self._renderer.close()
-        self._renderer = self._tracer = self._moving = None
+        for renderer in (self._renderer, self._watcher):
+            if renderer is not None:
+                renderer.close()
+        self._renderer = self._watcher = self._tracer = self._moving = None
         self._moments = [Moment()]
         for world in self._states.values():
             world.close()
@@ -627,7 +646,8 @@ def scene_spec(
     world = house if isinstance(house, World) else open_world(house, catalogue, cache, pictures or Unlit())
     free, lit = model.takeable(world.house, world.catalogue), world.lit if pictures else None
     parts = None if pictures else ()
-    spec = model.build_spec(world.house, world.catalogue, free=free, lit=lit, hinged=True, parts=parts)
+    lying = contents(world.house, world.catalogue, hidden=True) if pictures else ()
+    spec = model.build_spec(world.house, world.catalogue, free=free, lit=lit, hinged=True, parts=parts, contents=lying)
     spec.add_text(name=robots.HOUSE, data=world.house.to_json())
     return spec
 

@@ -13,17 +13,7 @@ from hand_data import build, paint
 
 from embodied.cli import main
 from embodied.datasets.checks import DatasetError
-from embodied.datasets.lerobot import (
-    ACTION,
-    CAMERA,
-    DEPTH,
-    FPS,
-    MOST_CANDIDATES,
-    STATE,
-    export_lerobot,
-    seen,
-    seen_depth,
-)
+from embodied.datasets.lerobot import ACTION, CAMERA, DEPTH, FPS, MOST_CANDIDATES, RECORDED_VFOV, STATE, export_lerobot
 from embodied.evaluation.evaluate import play
 from embodied.kinds.metrics import success
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
@@ -57,6 +47,14 @@ def folder(data, episodes, tmp_path_factory):
     steps = export_lerobot(data, folder, episodes, succeeded=lambda e: won(data, e), size=SMALL, depth=True)
     assert steps == sum(len(e.steps) for e in episodes)
     return folder
+
+
+def seen(file, pose, size) -> np.ndarray:
+    return file.read(pose.node).view_rgb(pose.yaw, pose.pitch, RECORDED_VFOV, size)
+
+
+def seen_depth(file, pose, size) -> np.ndarray:
+    return file.read(pose.node).view(pose.yaw, pose.pitch, RECORDED_VFOV, size)[1]
 
 
 def won(data, episode) -> bool:

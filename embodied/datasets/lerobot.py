@@ -17,6 +17,7 @@ LeRobotDataset v3.0).
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -29,12 +30,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from embodied.assets.cache import drafts, sweep, write_bytes, write_json
+from embodied.action_spaces import doors_in
+from embodied.assets.cache import default_cache, drafts, sweep, write_bytes, write_json
+from embodied.assets.catalogue import load_catalogue
 from embodied.assistants.descriptions import described
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.folders import filled
 from embodied.geometry import wrap
-from embodied.interface import Ask, Episode, Intention, Mode, Move, Place, Pose, Step, Stop
+from embodied.interface import Ask, Close, Episode, Intention, Mode, Open, Place, Pose, Step, Stop
+from embodied.navigation.doors import place_named, seen_name
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile
 
@@ -86,7 +90,7 @@ GRAPH_COLUMNS: Columns = {
     "candidate": (pa.int64(), None),
 }
 """Besides, of walks on a graph: where the agent can go, in its own frame (metres, zero behind the last), and which it
-chose, -1 for none. By their names LeRobot takes them for neither observations nor actions of a policy."""
+chose, or opened, -1 for none. By their names LeRobot takes them for neither observations nor actions of a policy."""
 DTYPES = {pa.float32(): "float32", pa.int64(): "int64", pa.bool_(): "bool"}
 
 
@@ -111,11 +115,12 @@ def export_lerobot(
       ValueError: the folder is not empty, there is no episode, one of no step, or a video cannot have this size.
       DatasetError: an episode of another data set's house, or a house without pictures.
     """
+    names = (*ACTION, "open", "close") if data.task_kind.opens_doors else ACTION
+    columns: Columns = {**GRAPH_COLUMNS, "action": (pa.list_(pa.float32(), len(names)), names)}
     with whole_folder(folder) as draft:
-        writer = Writer(draft, size, GRAPH_COLUMNS, depth=depth)
+        writer = Writer(draft, size, columns, depth=depth)
         for episode in episodes:
-            place = data.place_of(episode)
-            _add(writer, episode, place, _pictures(data, episode.task.world), succeeded)
+            _add(writer, episode, data, len(names), succeeded)
         return writer.finish(f"embodied {data.kind}", "lerobot", data)
 
 
@@ -140,13 +145,19 @@ def whole_folder(folder: Path) -> Iterator[Path]:
         draft.rename(folder)
 
 
-def _pictures(data: Dataset, name: str) -> Path:
-    if data.drawn_pictures(name) is None:
+def _panoramas(data: Dataset, episode: Episode) -> Iterator[Panorama]:
+    """Panoramas that were seen at each step, doors and furniture as they were."""
+    name, place = episode.task.world, data.place_of(episode)
+    if (drawn := data.drawn_pictures(name)) is None:
         raise DatasetError(
             f"{data.folder} has no pictures of {name!r}; draw them with `embodied dataset {data.kind} --out "
             f"{data.folder} ... --pictures fast`"
         )
-    return data.panoramas(name)
+    world = functools.cache(lambda: data.open_world(name, load_catalogue(), default_cache(), drawn))
+    with PanoramaFile(data.panoramas(name)) as file:
+        for node, (closed, _) in zip(episode.nodes, doors_in(episode, place.graph)):
+            seen = seen_name(place.house, place.graph, node, closed)
+            yield file.read(node) if seen == name else place_named({name: world()}, seen).panorama(node)
 
 
 def state(pose: Pose, place: Place) -> np.ndarray:
@@ -155,11 +166,11 @@ def state(pose: Pose, place: Place) -> np.ndarray:
 
 
 def action(step: Step, place: Place) -> np.ndarray:
-    """(7,) float32, ACTION: the next pose seen from this one."""
+    """(9,) float32, ACTION, the next pose seen from this one, and whether it opened or closed something."""
     yaw, pitch = step.next_pose.yaw - step.pose.yaw, step.next_pose.pitch - step.pose.pitch
     moved = offsets(step.pose, (step.next_pose.node,), place)[0]
-    asked, stopped = isinstance(step.action, Ask), isinstance(step.action, Stop)
-    return np.array([*moved, float(wrap(yaw)), pitch, asked, stopped], np.float32)
+    did = [isinstance(step.action, kind) for kind in (Ask, Stop, Open, Close)]
+    return np.array([*moved, float(wrap(yaw)), pitch, *did], np.float32)
 
 
 def offsets(pose: Pose, nodes: Sequence[int], place: Place) -> np.ndarray:
@@ -184,21 +195,21 @@ def candidates(step: Step, place: Place) -> np.ndarray:
     return offsets_of_all.ravel()
 
 
-def _add(writer: Writer, episode: Episode, place: Place, pictures: Path, succeeded: Callable[[Episode], bool]) -> None:
-    """One more episode."""
+def _add(writer: Writer, episode: Episode, data: Dataset, actions: int, succeeded: Callable[[Episode], bool]) -> None:
+    """One more episode, with so many numbers of its actions."""
     if not episode.steps:
         raise ValueError(f"the episode of {episode.task.id!r} has no step; leave it out")
-    if episode.task.closed:
-        raise ValueError(f"task {episode.task.id!r} closes doors, which stored pictures show open; leave it out")
+    place = data.place_of(episode)
     rows = {
         "observation.state": np.stack([state(s.pose, place) for s in episode.steps]),
-        "action": np.stack([action(s, place) for s in episode.steps]),
+        "action": np.stack([action(s, place)[:actions] for s in episode.steps]),
         "candidates": np.stack([candidates(s, place) for s in episode.steps]),
-        "candidate": np.array([s.action.candidate if isinstance(s.action, Move) else -1 for s in episode.steps]),
+        "candidate": np.array([getattr(s.action, "candidate", -1) for s in episode.steps]),
     }
-    with PanoramaFile(pictures) as file:
-        frames = [seen(file, s.pose, writer.size) for s in episode.steps]
-        depths = [seen_depth(file, s.pose, writer.size) for s in episode.steps] if writer.depth else []
+    frames, depths = list[np.ndarray](), list[np.ndarray]()
+    for s, panorama in zip(episode.steps, _panoramas(data, episode), strict=True):
+        frames.append(panorama.view_rgb(*(how := (s.pose.yaw, s.pose.pitch, RECORDED_VFOV, writer.size))))
+        depths += [panorama.view(*how)[1].astype(np.float32)] if writer.depth else []
     words, replies = spoken(episode.steps)
     facts = {"embodied/task": episode.task.id, "embodied/house": episode.task.world, "embodied/agent": episode.agent}
     writer.add(rows, frames, depths, words, replies, succeeded(episode), facts)
@@ -414,18 +425,6 @@ def depth_codes(metres: np.ndarray) -> np.ndarray:
     low, high = math.log(NEAREST + SHIFT), math.log(FARTHEST + SHIFT)
     clipped = np.clip(metres, NEAREST, FARTHEST)
     return np.rint((np.log(clipped + SHIFT) - low) / (high - low) * CODES).astype(np.uint16)
-
-
-def seen(file: PanoramaFile, pose: Pose, size: tuple[int, int]) -> np.ndarray:
-    """(h, w, 3) uint8: what an agent at `pose` has before its eyes."""
-    colours_only = Panorama(file.rgb(pose.node), *(np.empty((6, file.size, 0)),) * 2)
-    return colours_only.view_rgb(pose.yaw, pose.pitch, RECORDED_VFOV, size)
-
-
-def seen_depth(file: PanoramaFile, pose: Pose, size: tuple[int, int]) -> np.ndarray:
-    """(h, w) float32 metres along the optical axis: the same view's depth."""
-    view = file.read(pose.node).view(pose.yaw, pose.pitch, RECORDED_VFOV, size)
-    return np.asarray(view[1], np.float32)
 
 
 def _save(path: Path, table: pa.Table) -> None:

@@ -107,7 +107,7 @@ class HelpEnv:
             action = interface.Open(action.candidate, action.thought)
         before, situation = self.observation, self.situation
         mode, instruction, targets, subtask = self.mode, self.instruction, self.targets, self.subtask
-        reply, cost = None, self._cost(action)
+        reply, cost, moved = None, self._cost(action), self._moved_part(action)
         self.time_on_task += 1
         if isinstance(action, interface.Move):
             self.pose = self._reach[1][action.candidate]
@@ -124,19 +124,9 @@ class HelpEnv:
             self.time += 1
         if self.ended is None and self.time >= self.task.horizon:
             self.ended = "limit"
-        step = interface.Step(
-            pose=situation.pose,
-            mode=mode,
-            instruction=instruction,
-            targets=targets,
-            subtask=subtask.id if subtask else "none",
-            can_ask=before.can_ask,
-            candidate_nodes=situation.candidate_nodes,
-            action=action,
-            reply=reply,
-            next_pose=self.pose,
-            cost=cost,
-        )
+        stated = situation.pose, mode, instruction, targets, subtask.id if subtask else "none", before.can_ask
+        did = situation.candidate_nodes, action, reply, self.pose, cost
+        step = interface.Step(*stated, *did, moved=moved)
         self._steps.append(step)
         self.closed ^= doors_moved(step, self.world.graph, self.closed)
         return self._look() if self.ended is None else None
@@ -175,15 +165,8 @@ class HelpEnv:
 
     def so_far(self, agent: str = "") -> interface.Episode:
         """The episode as if its time were up now, unless it has ended."""
-        return interface.Episode(
-            task=self.task,
-            steps=tuple(self._steps),
-            ended=self.ended or "limit",
-            seed=self.seed,
-            agent=agent,
-            budget=self.budget,
-            house=self.world.house.digest[:16],
-        )
+        played, house = (tuple(self._steps), self.ended or "limit", self.seed), self.world.house.digest[:16]
+        return interface.Episode(self.task, *played, agent, self.budget, house)
 
     # What a rule with help overrides -------------------------------------------------------------
 
@@ -207,6 +190,10 @@ class HelpEnv:
         if self.assistant is None or (self.budget is not None and self.requests >= self.budget):
             return ()
         return self.assistant.intentions(situation)
+
+    def _moved_part(self, action: interface.Action) -> tuple[str, ...]:
+        """Parts of furniture that an action opens or closes."""
+        return ()
 
     def _cost(self, action: interface.Action) -> float:
         return 0.0
@@ -242,24 +229,12 @@ class HelpEnv:
         if len(self._trail) <= self.time:
             self._trail.append(self.pose.node)
         left = None if self.budget is None else max(self.budget - self.requests, 0)
-        self.situation = interface.Situation(
-            world=self.world,
-            task=self.task,
-            pose=self.pose,
-            mode=self.mode,
-            targets=self.targets,
-            subtask=self.subtask,
-            candidate_nodes=tuple(p.node for p in poses),
-            candidates=candidates,
-            time=self.time,
-            requests=self.requests,
-            requests_left=left,
-            trail=tuple(self._trail),
-            extras=self._truth(),
-            closed=self.closed,
-        )
+        doing = self.world, self.task, self.pose, self.mode, self.targets, self.subtask
+        ways = tuple(p.node for p in poses), candidates
+        now = interface.Situation(*doing, *ways, self.time, self.requests, left, tuple(self._trail), closed=self.closed)
+        self.situation = dataclasses.replace(now, extras=self._truth())
         self.observation = interface.Observation(
-            sight=interface.Sight(self._seen(), self.pose.node),
+            sight=interface.Sight(self.seen_from(self.pose.node), self.pose.node),
             turn=self.pose.turn,
             tilt=self.pose.tilt,
             candidates=candidates,
@@ -288,12 +263,10 @@ class HelpEnv:
         here, graph = self.pose.node, self.world.graph
         return tuple(k for k, p in enumerate(self._reach[1]) if opened and graph.barred(here, p.node, opened))
 
-    def _seen(self) -> str:
-        """Name of what is seen from here, doors as they are."""
+    def seen_from(self, node: int) -> str:
+        """Name of what is seen from a node, doors and furniture as they are."""
         house, graph = self.world.house, self.world.graph
-        if self.closed == graph.closed:
-            return self.task.world
-        return seen_name(house, graph, self.pose.node, self.closed)
+        return self.task.world if self.closed == graph.closed else seen_name(house, graph, node, self.closed)
 
     def _check(self, action: interface.Action) -> None:
         if self.ended is not None:
@@ -352,7 +325,9 @@ def check_task(task: interface.Task, worlds: Mapping[str, interface.Place]) -> N
     doors = {d for passed in world.graph.doors.values() for d in passed}
     if unknown := sorted(set(task.closed) - doors):
         raise TaskError(f"task {task.id!r} closes {unknown}; doors that bar ways of {task.world!r} are {sorted(doors)}")
-    missing = [p for p in things if p not in house.placement_by_id] + [r for r in rooms if r not in house.room_by_id]
+    missing = [p for p in things if not {p, p.partition(".")[0]} & {*house.placement_by_id}] + [
+        r for r in rooms if r not in house.room_by_id
+    ]
     if missing:
         raise TaskError(f"task {task.id!r} looks for {missing}, not in the house {task.world!r}; sample it again")
     if task.horizon < 1 or (task.budget is not None and task.budget < 0):

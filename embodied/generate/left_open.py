@@ -10,9 +10,9 @@ import shapely
 
 from embodied.assets.moving_parts import MovingPart
 from embodied.geometry import rotation
-from embodied.house.house import House, Placement
+from embodied.house.house import WINDOWS, House, Opening, Placement
 from embodied.house.moment import WIDEST, Moment, apart
-from embodied.house.shapes import footprint
+from embodied.house.shapes import footprint, inward
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ BATHS, BATH_DOORS = ("bathroom", "toilet"), (0.6, 0.1, 0.4)
 
 
 def free_openness(house: House, catalogue: Catalogue) -> dict[str, float]:
-    """How far every part of furniture can open, 0 to 1 by placement id and part, until it meets a wall or the box
-    around another thing; handles may touch."""
+    """How far every part of furniture and every window can open, 0 to 1 by placement id and part, or by opening, until
+    it meets a wall or the box around another thing; handles may touch."""
     rooms = {r.id: house.floor(r) for r in house.rooms}
     boxes = [(p, footprint(p), p.position[2], p.position[2] + p.size[2]) for p in house.placements]
     out = {}
@@ -40,7 +40,18 @@ def free_openness(house: House, catalogue: Catalogue) -> dict[str, float]:
         for m in whole.moving if whole is not None else ():
             met = (k for k, front in enumerate(_swept(p, m)) if _meets(front, rooms[p.room], others))
             out[f"{p.id}/{m.name}"] = float(([0.0, *OPENNESS_STEPS])[next(met, len(OPENNESS_STEPS))])
-    return out
+    return out | {o.id: _window(house, o, boxes) for o in house.openings if o.kind in WINDOWS}
+
+
+def _window(house: House, o: Opening, boxes: list[tuple]) -> float:
+    """How far the casements of a window can open into their room; what hangs there gives way."""
+    a, b, floor = np.asarray(o.a, float), np.asarray(o.b, float), house.floor_height(o)
+    wide, wall = float(np.linalg.norm(b - a)) / o.casements, shapely.LineString([a, b])
+    before = shapely.Polygon([a, b, *(end + wide * inward(house, o) for end in (b, a))])
+    there = lambda p: p.room == o.rooms[0] and p.object_class not in ("curtain", "window blind")
+    level = [(p, x) for p, x, low, high in boxes if low < floor + o.head - NEAR and high > floor + o.sill + NEAR]
+    met = [x.distance(wall) for p, x in level if there(p) and x.intersects(before)]
+    return float(np.arcsin(min([wide, *met]) / wide) / WIDEST)
 
 
 def _swept(p: Placement, m: MovingPart) -> Iterator[tuple[shapely.Geometry, float, float]]:
@@ -64,8 +75,8 @@ def _meets(front: tuple, room: shapely.Polygon, others: list[tuple]) -> bool:
 
 
 def left_open(house: House, catalogue: Catalogue) -> Moment:
-    """All that the household has left open, by the house's seed: doors and drawers of furniture, more where it is
-    untidy, and bathroom doors ajar. `left_open(house, catalogue).applied(house)` is such a house."""
+    """All that the household has left open, by the house's seed: windows, doors and drawers of furniture, more where it
+    is untidy, and bathroom doors ajar. `left_open(house, catalogue).applied(house)` is such a house."""
     kinds = {r.id: r.kind for r in house.rooms}
     baths = [o for o in house.openings if o.kind == "door" and {kinds.get(r or "") for r in o.rooms} & {*BATHS}]
     shares = {o.id: (*BATH_DOORS, o.angle / WIDEST) for o in baths if o.leaf_finish is not None}

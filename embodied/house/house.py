@@ -34,6 +34,7 @@ WEATHERS = ("clear", "hazy", "overcast")
 LANDSCAPES = ("suburb", "village", "street", "roofs", "lake", "fields", "forest")
 SEASONS = ("spring", "summer", "autumn", "winter")
 HINGED = ("door", "front_door", "back_door")
+WINDOWS = ("window", "french_window")
 DOORS = ("door", "passage", "front_door", "back_door", "french_window", "garage_door")
 """Opening kinds that a person can walk through."""
 
@@ -109,7 +110,18 @@ class Opening:
     hinge: str = "a"
     """The jamb, 'a' or 'b', that carries the hinges."""
     angle: float = 0.0
-    """How far a leaf stands open, radians; 0 is closed."""
+    """How far its leaves, or the casements of a window, stand open, radians; 0 is closed."""
+
+    @property
+    def opens(self) -> bool:
+        """True for what turns on hinges: doors with leaves, and windows."""
+        return self.kind in WINDOWS or (self.kind in HINGED and self.leaf_finish is not None)
+
+    @property
+    def casements(self) -> int:
+        """How many a window has."""
+        wide = 0.85 if self.kind == "french_window" or self.sill < 0.05 else 0.95
+        return max(1, min(6, round(math.dist(self.a, self.b) / wide)))
 
 
 @dataclass(frozen=True)

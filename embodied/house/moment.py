@@ -12,11 +12,11 @@ from typing import TypeAlias
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from embodied.assets.moving_parts import OPEN, TakenApart, closed, openness_of, taken_apart
+from embodied.assets.moving_parts import OPEN, OPENING_CLASSES, TakenApart, closed, openness_of, taken_apart
 from embodied.assets.people import Pose, people
 from embodied.assets.records import MeshPart
 from embodied.geometry import rotation
-from embodied.house.house import HINGED, House, HouseError, Light, Placement
+from embodied.house.house import House, HouseError, Light, Placement
 from embodied.house.shapes import room_at
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -120,11 +120,11 @@ class Moment:
         Raises:
           ValueError: it names what the house does not have, an openness outside 0 to 1, or no pose.
         """
-        doors = {o.id for o in house.openings if o.kind in HINGED and o.leaf_finish is not None}
+        doors = {o.id for o in house.openings if o.opens}
         furniture = {o.partition("/")[0] for o in self.openness if "/" in o}
         for kind, names, known in (
             ("things", {*self.moved, *furniture}, house.placement_by_id),
-            ("doors that open", {o for o in self.openness if "/" not in o}, doors),
+            ("doors or windows that open", {o for o in self.openness if "/" not in o}, doors),
             ("lights", self.lamps, {x.id for x in house.lights}),
         ):
             if unknown := sorted(set(names) - set(known)):
@@ -205,7 +205,8 @@ def carried(root: Placement, pose: RigidPose, p: Placement) -> RigidPose:
 
 def apart(mesh: Callable[..., tuple[MeshPart, ...]], p: Placement) -> TakenApart | None:
     """A placement, closed, with its moving parts apart; None where nothing of it moves. `mesh`: Catalogue.mesh."""
-    return taken_apart(p.object_class, mesh(p.asset, p.size, closed(p.params)))
+    known = p.object_class in OPENING_CLASSES
+    return taken_apart(p.object_class, mesh(p.asset, p.size, closed(p.params))) if known else None
 
 
 def _opened(p: Placement, openness: Mapping[str, float]) -> Placement:

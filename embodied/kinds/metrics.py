@@ -24,14 +24,14 @@ def trajectory_of(episode: Episode, graph: NavGraph) -> Trajectory:
     """An episode on a graph as it is judged.
 
     Its way is as long as the graph's distances between consecutive nodes (docs/sources.md, S4), and OPENING longer for
-    each door that is opened or closed (docs/sources.md, S185). The shortest way is what the kind of task says, or that
-    from the start to the goal nearest the *final* node, with the doors that it opens.
+    each door or part of furniture that is opened or closed (docs/sources.md, S185). The shortest way is what the kind
+    of task says, or that from the start to the goal nearest the *final* node, with the doors that it opens.
     """
     task, kind, nodes, goals = episode.task, kind_named(episode.task.kind), [*episode.nodes], [*episode.task.goal_nodes]
     metres, steps = np.asarray(graph.distance), np.asarray(graph.distance)[nodes[:-1], nodes[1:]]
     goal = min(goals, key=lambda g: (metres[nodes[-1], g], g))
     closed = graph.closed.union(task.closed)
-    if closed:
+    if closed or any(s.moved for s in episode.steps):
         steps = steps + [OPENING * len(moved) for _, moved in doors_in(episode, graph)]
     shortest = behind_doors(graph, closed).distance[nodes[0], goal]
     return Trajectory(

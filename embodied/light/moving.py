@@ -16,9 +16,10 @@ import cv2
 import numpy as np
 
 from embodied.assets.catalogue import Catalogue
-from embodied.assets.moving_parts import TakenApart, openness_of
+from embodied.assets.moving_parts import TakenApart, closed, openness_of
 from embodied.assets.people import people
-from embodied.house.house import House
+from embodied.generate.contents import STORED, contents
+from embodied.house.house import House, Opening
 from embodied.house.moment import WIDEST, Moment, RigidPose, apart
 from embodied.house.shapes import room_at
 from embodied.light.movers import Placed, Surface, SurfacePage, shading, surface_of
@@ -32,7 +33,7 @@ from embodied.light.tracing.rays import gloss_data_of
 from embodied.render.gloss import GlossData, texels_at
 from embodied.scene.cupboards import lit_apart
 from embodied.scene.house_meshes import object_parts
-from embodied.scene.joinery import opening_parts
+from embodied.scene.joinery import FIXED_FRAME, opening_parts
 from embodied.scene.lit_pages import ANYWHERE, LitMesh, LitPages
 from embodied.scene.part import Part
 
@@ -88,6 +89,8 @@ class MovingHouse:
         self._skins: dict[str, Skin] = {}
         self._bent: dict[str, list[np.ndarray]] = {}
         self._lit_bent: dict[str, np.ndarray] = {}
+        self.contents: dict[str, str] = {}
+        """Classes of what lies in furniture that was opened, by id."""
 
     def add(self, name: str, parts: Sequence[Part]) -> None:
         """Tell of a body that is no part of the house, in its own frame; it is drawn where `Moment.bodies` says."""
@@ -103,10 +106,7 @@ class MovingHouse:
         for o in self.house.openings:
             if o.id in moment.openness:
                 turned_ = dataclasses.replace(o, angle=moment.openness[o.id] * WIDEST)
-                for p in opening_parts(self.house, turned_, self.catalogue.finish):
-                    if p.mesh_key.startswith("leaf/"):
-                        name = f"{o.id}@{'+' if '/+1' in p.mesh_key else '-'}"
-                        out[name] = RigidPose.upright(p.position, p.yaw)
+                out |= {name: RigidPose.upright(p.position, p.yaw) for name, p in self._leaf_parts(turned_)}
         for thing, openness in moment.open_parts(self.house).items():
             placement = self.house.placement_by_id[thing]
             if moment.carrier(self.house, placement) is not None:
@@ -187,7 +187,7 @@ class MovingHouse:
         if name in self._extra:
             return _Thing(self._surface(self._extra[name]), None, frozenset())
         if "@" in name:
-            return self._leaf(*name.rsplit("@", 1))
+            return self._leaf(name)
         if "/" in name:
             return self._part(*name.split("/"))
         root = self.house.placement_by_id[name]
@@ -203,13 +203,15 @@ class MovingHouse:
             settings = dataclasses.replace(settings, budget=settings.budget * BODY_LUXELS)
         return surface_of(parts, settings, self._cache, self.house, self.pages.lamps)
 
-    def _leaf(self, opening: str, side: str) -> _Thing:
-        o = next(x for x in self.house.openings if x.id == opening)
-        parts = [
-            p
-            for p in opening_parts(self.house, o, self.catalogue.finish)
-            if p.mesh_key.startswith("leaf/") and ("/+1" in p.mesh_key) == (side == "+")
-        ]
+    def _leaf_parts(self, o: Opening) -> Iterator[tuple[str, Part]]:
+        """The parts of an opening that are drawn apart, with names of the things they belong to, by their hinges."""
+        for p in opening_parts(self.house, o, self.catalogue.finish, True):
+            if p.mesh_key.startswith("leaf/") or p.mesh_key.endswith(FIXED_FRAME):
+                yield f"{o.id}@{p.position[0]:.3f} {p.position[1]:.3f}", p
+
+    def _leaf(self, name: str) -> _Thing:
+        o = next(x for x in self.house.openings if x.id == name.partition("@")[0])
+        parts = [p for leaf, p in self._leaf_parts(o) if leaf == name]
         rest = RigidPose.upright(parts[0].position, parts[0].yaw)
         owners = frozenset(p.owner for p in parts)
         return _Thing(self._surface([_in_frame(p, rest) for p in parts]), rest, owners)
@@ -220,8 +222,16 @@ class MovingHouse:
         assert whole is not None, "checked by World.show"
         meshes = whole.parts[name] if name else whole.within
         keys = [f"{p.asset}/{p.size}/{p.params}/{name}#{k}" for k in range(len(meshes))]
-        surface = self._surface([Part(p.id, "object", p.room, m, k) for m, k in zip(meshes, keys, strict=True)])
+        parts = [Part(p.id, "object", p.room, m, k) for m, k in zip(meshes, keys, strict=True)]
         rest = RigidPose.upright(p.position, p.yaw)
+        drawers = {f"{STORED}{m.name}": m.name for m in whole.moving if m.slides}
+        closed_ = dataclasses.replace(p, params=closed(p.params))
+        inside = contents(dataclasses.replace(self.house, placements=(closed_,)), self.catalogue, hidden=True)
+        lying = tuple(c for c in inside if drawers.get(c.group or "", "") == name)
+        self.contents |= {c.id: c.object_class for c in lying}
+        some = dataclasses.replace(self.house, placements=lying)
+        parts += [_in_frame(x, rest) for x in object_parts(some, self.catalogue)]
+        surface = self._surface(parts)
         for m in whole.moving:
             if m.name == name:
                 rest = rest.then(*m.turn(openness_of(p.params).get(name, 0.0)))
@@ -232,14 +242,8 @@ class MovingHouse:
         """The house's own meshes without what is drawn apart, and, of each face, the number that it had."""
         away = frozenset().union(*(t.owners for t in self._things.values()))
         open_ = {name.partition("/")[0] for name in self._things if "/" in name}
-        return [
-            (_nothing(m), np.zeros(0, int))
-            if m.owner in away
-            else self._opened(m)
-            if m.owner in open_
-            else (m, np.arange(len(m.faces)))
-            for m in self.bake.lit.meshes
-        ]
+        whole = lambda m: self._opened(m) if m.owner in open_ else (m, np.arange(len(m.faces)))
+        return [(_nothing(m), np.zeros(0, int)) if m.owner in away else whole(m) for m in self.bake.lit.meshes]
 
     def _opened(self, m: LitMesh) -> tuple[LitMesh, np.ndarray]:
         """A mesh of furniture that is open: cut open, without its inside and the parts that moved."""
@@ -255,12 +259,9 @@ class MovingHouse:
 
     def _lit_at(self, things: Mapping[str, tuple[Surface, RigidPose]]) -> dict[str, Placed]:
         """Things where they are to be, and the light on them."""
-        placed = {
-            name: Placed(
-                s, pose, pose, self._soft_light(s, pose, name.endswith(INSIDE_NAME)) + self.pages.lamplight(s, pose)
-            )
-            for name, (s, pose) in things.items()
-        }
+        soft = lambda name, s, pose: self._soft_light(s, pose, name.endswith(INSIDE_NAME))
+        lit = {n: soft(n, s, pose) + self.pages.lamplight(s, pose) for n, (s, pose) in things.items()}
+        placed = {n: Placed(s, pose, pose, lit[n]) for n, (s, pose) in things.items()}
         if not self.pages.is_sunny or not placed:
             return placed
         every = list(placed.values())

@@ -28,10 +28,11 @@ def closable_doors(house: House, graph: NavGraph) -> tuple[str, ...]:
 
 
 def seen_name(house: House, graph: NavGraph, node: int, closed: Collection[str]) -> str:
-    """Name of what is seen from a node while some doors are closed: the house's own where nothing in sight differs.
+    """Name of what is seen from a node while some doors are closed, and parts of furniture, 'dresser_1/drawer_1', open:
+    the house's own where nothing in sight differs.
 
     A closed door hides what is behind it, so of the doors that differ from the house at rest only those count that
-    a way without opening leads to.
+    a way without opening leads to, and of furniture what stands in the same room.
     """
     changed = changed_doors(graph, closed)
     if not changed:
@@ -39,12 +40,14 @@ def seen_name(house: House, graph: NavGraph, node: int, closed: Collection[str])
     reached = np.isfinite(behind_doors(graph, frozenset(closed), np.inf).distance[node])
     rooms = {graph.room_of_node[n] for n in np.flatnonzero(reached)}
     beside = [o.id for o in room_doors(house) if o.id in changed and rooms.intersection(o.rooms)]
+    room_of = {p.id: p.room for p in house.placements}
+    beside += [d for d in changed if room_of.get(d.partition("/")[0]) == graph.room_of_node[node]]
     return house.name + MARK + ",".join(f"{d}={changed[d]:g}" for d in beside) if beside else house.name
 
 
 def changed_doors(graph: NavGraph, closed: Collection[str]) -> dict[str, float]:
-    """Openness, 0 or 1, of the doors that differ from the house at rest while some doors are closed."""
-    return {d: float(d not in closed) for d in sorted(graph.closed.symmetric_difference(closed))}
+    """Openness, 0 or 1, of what differs from the house at rest while some doors are closed and furniture is open."""
+    return {d: float("/" in d or d not in closed) for d in sorted(graph.closed.symmetric_difference(closed))}
 
 
 def place_named(places: Mapping[str, P], name: str) -> P:

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 from embodied.assets.moving_parts import FIXED, TakenApart, boards_of, cut_open, openness_of
 from embodied.assets.records import MeshPart
 from embodied.house.house import House, Placement
-from embodied.house.moment import apart
+from embodied.house.moment import RigidPose, apart
 from embodied.scene import collision
 from embodied.scene.collision import CollisionBox
 from embodied.scene.doors import LEAF_DENSITY, Hung
@@ -28,12 +28,8 @@ from embodied.scene.house_meshes import Meshes
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 
-PHYSICS = {
-    "door": {"damping": 2.0, "frictionloss": 0.3},
-    "flap": {"damping": 10.0, "frictionloss": 10.0},
-    "drawer": {"damping": 10.0, "frictionloss": 2.0},
-    "lid": {"damping": 1.0, "frictionloss": 1.0},
-}
+_DAMPED = {"door": (2.0, 0.3), "flap": (10.0, 10.0), "drawer": (10.0, 2.0), "lid": (1.0, 1.0), "curtain": (4.0, 2.0)}
+PHYSICS = {kind: {"damping": d, "frictionloss": f} for kind, (d, f) in _DAMPED.items()}
 """Of joints by kind: RoboCasa's damping of cabinets and drawers, MolmoSpaces' friction, and its numbers of ovens."""
 GAP = 0.002
 """Metres between a front and what is around it."""
@@ -63,9 +59,9 @@ def _case(spec: mujoco.MjSpec, p: Placement, whole: TakenApart) -> Case:
     still = spec.worldbody.add_body(name=p.id, pos=p.position, quat=[math.cos(half), 0, 0, math.sin(half)])
     _region(still, f"{p.id}_reg_main", np.array([[-w / 2, -d / 2, 0], [w / 2, d / 2, h]]))
     bodies = {"": Hung(still, (0.0, 0.0, 0.0))}
-    hollow = sum(m.kind != "lid" for m in whole.moving)
+    hollow = sum(m.kind not in ("lid", "curtain") for m in whole.moving)
     for m in whole.moving:
-        is_drawer, value = m.kind == "drawer", openness_of(p.params).get(m.name, 0.0)
+        is_drawer, value = m.slides, openness_of(p.params).get(m.name, 0.0)
         scale, (turn, shift) = 1.0 if is_drawer else math.degrees(1), m.turn(value)
         quat, at = Rotation.from_matrix(turn).as_quat()[[3, 0, 1, 2]], tuple((-m.origin).tolist())
         body = still.add_body(name=f"{p.id}_{m.name}", pos=turn @ m.origin + shift, quat=quat)
@@ -76,7 +72,9 @@ def _case(spec: mujoco.MjSpec, p: Placement, whole: TakenApart) -> Case:
         joint = body.add_joint(name=joint_name(p, m.name), type=kind, axis=m.axis, **span, **PHYSICS[m.kind])
         joint.userdata = [m.reach]  # openness 1
         bodies |= {m.name: Hung(body, at), f"{m.name}_handle": Hung(handle, (0.0, 0.0, 0.0))}
-        if m.kind != "lid":
+        if m.kind == "curtain":
+            body.mass, body.inertia, body.ipos, body.explicitinertial = 1.0, [0.2, 0.2, 0.01], [0, 0, 0], True
+        elif m.kind != "lid":
             name = f"{p.id}_reg_int" + (f"_{m.name}" if hollow > 1 else "")
             _region(*((body, name, m.inside - m.origin) if is_drawer else (still, name, m.inside)))
     return Case(p, whole, bodies)
@@ -93,7 +91,7 @@ def joint_name(p: Placement, part: str) -> str:
     word = part.replace("_", "")
     if p.object_class == "microwave":
         return f"{p.id}_microjoint"
-    if part.startswith("drawer"):
+    if part.startswith("drawer") or part.endswith("half"):
         return f"{p.id}_slidejoint" if part == "drawer" else f"{p.id}_{word}_slidejoint"
     return f"{p.id}_lid_joint" if part == "lid" else f"{p.id}_{word}hinge"
 
@@ -117,6 +115,17 @@ def parts_of(case: Case, *, hidden: bool = False) -> Iterator[tuple[Part, Hung]]
     for name, meshes in shown.items():
         for k, mesh in enumerate(meshes):
             yield Part(p.id, "object", p.room, mesh, f"{p.asset}/{p.size}/{p.params}/{name}/{k}"), case.bodies[name]
+
+
+def lying(cases: Mapping[str, Case], things: Sequence[Placement], catalogue: Meshes) -> Iterator[tuple[Part, Hung]]:
+    """The meshes of what lies in closed furniture (embodied.generate.contents), with the bodies that carry them."""
+    for c in (c for c in things if c.parent in cases):
+        case, name = cases[c.parent or ""], (c.group or "").partition("/")[2]
+        p, m = case.placement, next(m for m in case.whole.moving if m.name == name)
+        x, y, z = RigidPose.upright(p.position, p.yaw).local(np.array([c.position]))[0] - m.slides * m.origin
+        hung = Hung(case.bodies[name if m.slides else ""].body, (x, y, z))
+        for k, mesh in enumerate(catalogue.mesh(c.asset, c.size)):
+            yield Part(c.id, "object", c.room, mesh, f"{c.asset}/{c.size}#{k}"), hung
 
 
 def lit_apart(m: LitMesh, p: Placement, whole: TakenApart) -> tuple[LitMesh, np.ndarray, np.ndarray]:

@@ -22,9 +22,10 @@ class Meshes(typing.Protocol):
     def finish(self, material_key: str) -> Finish: ...
 
 
-def house_parts(house: House, catalogue: Meshes) -> tuple[Part, ...]:
-    """Everything visible in and around the house: shell first, then placements, in the house's order."""
-    return shell_parts(house, catalogue.finish) + object_parts(house, catalogue)
+def house_parts(house: House, catalogue: Meshes, apart: bool = False) -> tuple[Part, ...]:
+    """Everything visible in and around the house: shell first, then placements, in the house's order; `apart`: as of
+    joinery.opening_parts."""
+    return shell_parts(house, catalogue.finish, apart) + object_parts(house, catalogue)
 
 
 def object_parts(house: House, catalogue: Meshes) -> tuple[Part, ...]:

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from embodied.assets.built.primitives import Shape, between, box, cylinder, frame, joined, part, quads, tube, upright
 from embodied.assets.records import Finish
-from embodied.house.house import House, Opening
+from embodied.house.house import WINDOWS, House, Opening
 from embodied.house.shapes import inward
 from embodied.scene.outdoors import facade_finish
 from embodied.scene.part import Part
@@ -25,6 +25,12 @@ from embodied.seeds import stream
 PIECES = ("reveal", "frame", "leaf", "leaf_2", "handle", "glass", "sill", "threshold")
 """Owners of an opening are '<opening>/<piece>'."""
 
+Sash = tuple[list[Shape], list[Shape], list[Shape]]
+"""Boards, panes and handles of one casement."""
+FIXED_FRAME = "#fixed"
+"""End of the mesh key of what stays of a window that is open."""
+SASH_STEP = 0.012
+"""Metres by which casements stand before their frame."""
 PANE_FINISH = Finish(color=(0.86, 0.93, 0.92, 0.08), roughness=0.02, specular=0.5)
 FITTING_METAL = Finish(color=(0.72, 0.71, 0.69, 1.0), roughness=0.32, metallic=1.0)
 STONE_SILL = Finish(color=(0.78, 0.77, 0.74, 1.0), roughness=0.35)
@@ -73,22 +79,15 @@ def hole_frame(house: House, opening: Opening) -> _Hole:
     half = house.inner_wall / 2
     far = -half if opening.rooms[1] is not None else -(house.outer_wall - half)
     z = house.storey_of(room).elevation
-    return _Hole(
-        opening,
-        float(np.linalg.norm(q - p)),
-        (float(p[0]), float(p[1]), z),
-        math.atan2(d[1], d[0]),
-        half,
-        far,
-        (opening.hinge == "a") != flipped,
-    )
+    at, yaw, at_origin = (float(p[0]), float(p[1]), z), math.atan2(d[1], d[0]), (opening.hinge == "a") != flipped
+    return _Hole(opening, float(np.linalg.norm(q - p)), at, yaw, half, far, at_origin)
 
 
-def opening_parts(house: House, opening: Opening, finish: Callable[[str], Finish]) -> list[Part]:
-    """Everything that belongs to one opening."""
+def opening_parts(house: House, opening: Opening, finish: Callable[[str], Finish], apart: bool = False) -> list[Part]:
+    """Everything that belongs to one opening; `apart`: with the casements of a window apart, though it is closed."""
     hole = hole_frame(house, opening)
-    if opening.kind in ("window", "french_window"):
-        return _window(house, hole, finish)
+    if opening.kind in WINDOWS:
+        return _window(house, hole, finish, apart or opening.angle > 0)
     if opening.kind == "passage" and opening.leaf_finish is None:
         wall = finish(house.room_by_id[opening.rooms[0]].wall_finish)
         reveal = _part(hole, "reveal", "wall", wall, _tunnel(hole, hole.outside, hole.inside, False))
@@ -137,7 +136,7 @@ def _threshold(house: House, hole: _Hole, y0: float, y1: float, finish: Callable
 # ------------------------------------------------------------------ windows
 
 
-def _window(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[Part]:
+def _window(house: House, hole: _Hole, finish: Callable[[str], Finish], apart: bool) -> list[Part]:
     o = hole.opening
     room = house.room_by_id[o.rooms[0]]
     frame_finish = finish(o.leaf_finish or "paint_white/0")
@@ -145,14 +144,18 @@ def _window(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[
     y0 = hole.outside + (0.10 if outdoors else 0.025)
     y1 = y0 + 0.07
     french = o.kind == "french_window" or o.sill < 0.05
-    sashes, panes, handles = _sashes(house, hole, y0, y1, french)
+    outer_frame, sashes = _sashes(house, hole, y0, y1, french)
     parts = [_part(hole, "reveal", "wall", finish(room.wall_finish), _tunnel(hole, y1 - 0.01, hole.inside, False))]
     outer = finish(facade_finish(house)) if outdoors else finish(room.wall_finish)
     parts.append(_part(hole, "reveal", "wall", outer, _tunnel(hole, hole.outside, y0, True), tag="#outer"))
-    parts.append(_part(hole, "frame", "opening", frame_finish, sashes))
-    parts.append(_part(hole, "glass", "opening", PANE_FINISH, panes))
-    if handles:
-        parts.append(_part(hole, "handle", "opening", FITTING_METAL, *handles))
+    materials = {"frame": frame_finish, "glass": PANE_FINISH, "handle": FITTING_METAL}
+    if apart:
+        parts.append(_part(hole, "frame", "opening", frame_finish, *outer_frame, tag=FIXED_FRAME))
+        parts += _casements(hole, y1 + SASH_STEP, sashes, materials)
+    else:
+        for k, (piece, material) in enumerate(materials.items()):
+            shapes = [*(outer_frame if k == 0 else ()), *(x for sash in sashes for x in sash[k])]
+            parts.append(_part(hole, piece, "opening", material, *shapes))
     if french:
         parts += _threshold(house, hole, y1, hole.inside, finish)
     else:
@@ -166,25 +169,37 @@ def _window(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[
     return parts
 
 
-def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tuple[Shape, Shape, list[Shape]]:
-    """Fixed frame with one to five casements; their panes; their handles."""
+def _casements(hole: _Hole, y: float, sashes: Sequence[Sash], materials: dict[str, Finish]) -> Iterator[Part]:
+    """Casements on their hinges, at the opening's angle, into the first room; handles are away from the hinges."""
+    for k, sash in enumerate(sashes):
+        side, o, xs = (1.0, -1.0)[k % 2], hole.opening, joined(*sash[0]).vertices[:, 0]
+        x = float(xs.min() if side > 0 else xs.max())
+        for (piece, material), shapes in zip(materials.items(), sash, strict=True):
+            if shapes:
+                mesh, key = part(material, joined(*shapes).moved(-x, -y, 0.0)), f"leaf/{o.id}/{k}/{piece}/{side:+.0f}"
+                place = hole.point(x, y, 0.0), hole.yaw + side * o.angle
+                yield Part(f"{o.id}/{piece}", "opening", o.rooms[0], mesh, key, *place)
+
+
+def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tuple[list[Shape], list[Sash]]:
+    """Fixed frame with one to six casements."""
     o = hole.opening
     w, z0, z1 = hole.length, o.sill, o.head
     outer, sash = 0.045, 0.055
-    count = max(1, min(6, round(w / (0.85 if french else 0.95))))
+    count = o.casements
     bars = stream(house.seed, "joinery", "bars").random() < 0.3
-    boards = frame(0, w, z0, z1, (y0, y1), outer)
     foot = 0.12 if french else sash
     cells = np.linspace(outer, w - outer, count + 1)
-    panes, handles = [], []
+    sashes: list[Sash] = []
     for i in range(count):
+        handles: list[Shape] = []
         x0, x1 = cells[i] + 0.002, cells[i + 1] - 0.002
         b0, b1 = z0 + outer + 0.002, z1 - outer - 0.002
-        boards += frame(x0, x1, b0, b1, (y0 + 0.012, y1 + 0.012), sash, 0.006, foot)
+        boards = frame(x0, x1, b0, b1, (y0 + SASH_STEP, y1 + SASH_STEP), sash, 0.006, foot)
         gx0, gx1 = x0 + sash - 0.006, x1 - sash + 0.006
         gz0, gz1 = b0 + foot - 0.006, b1 - sash + 0.006
         ym = (y0 + y1) / 2
-        panes.append(upright(gx1, gx0, gz0, gz1, ym).two_sided())
+        pane = upright(gx1, gx0, gz0, gz1, ym).two_sided()
         if bars:
             rows = max(1, round((gz1 - gz0) / 0.5))
             for k in range(1, rows):
@@ -194,11 +209,12 @@ def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tu
                 xb = (gx0 + gx1) / 2
                 boards.append(box([xb - 0.011, ym - 0.0125, gz0], [xb + 0.011, ym + 0.0125, gz1], 0.003))
         if i % 2 == 0:
-            x, y = x1 - sash / 2, y1 + 0.012
+            x, y = x1 - sash / 2, y1 + SASH_STEP
             z = min(max(1.05, z0 + 0.25), (z0 + z1) / 2 + 0.25) if french else (z0 + z1) / 2
             way = [(x, y + 0.008, z), (x, y + 0.035, z), (x, y + 0.042, z - 0.012), (x, y + 0.042, z - 0.11)]
             handles += [box([x - 0.014, y, z - 0.035], [x + 0.014, y + 0.01, z + 0.035], 0.004), tube(way, 0.008, 8)]
-    return joined(*boards), joined(*panes), handles
+        sashes.append((boards, [pane], handles))
+    return frame(0, w, z0, z1, (y0, y1), outer), sashes
 
 
 # ------------------------------------------------------------------ doors

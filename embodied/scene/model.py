@@ -170,6 +170,7 @@ def build_spec(
     lit: LitPages | None = None,
     parts: Sequence[Part] | None = None,
     hinged: bool = False,
+    contents: Sequence[Placement] = (),
 ) -> mujoco.MjSpec:
     """The house as an MjSpec.
 
@@ -177,6 +178,7 @@ def build_spec(
       free, collisions, lit: as for `compile_scene`.
       hinged: doors turn on hinges, and what furniture has moves (embodied.scene.doors, cupboards); fixed without.
       parts: house_parts(house, catalogue) where the caller has them already.
+      contents: what lies in closed furniture that is hinged (embodied.generate.contents).
 
     Raises:
       ValueError: `free` names something that is no placement; `lit` was baked for another house.
@@ -188,25 +190,29 @@ def build_spec(
     spec = _empty_spec(house)
     if free or hinged:
         _let_move(spec)
-    shell = parts or (shell_parts(house, catalogue.finish) if hinged or collisions else ())
+    apart = hinged and lit is None
+    shell = parts or (shell_parts(house, catalogue.finish, apart) if hinged or collisions else ())
     hung = doors.hang(spec, house, shell) if hinged else {}
     cases = cupboards.hang(spec, house, catalogue, free) if hinged else {}
+    lying = list(cupboards.lying(cases, contents, catalogue))
     bodies = {p: Hung(_free_body(spec, house.placement_by_id[p]), (0.0, 0.0, 0.0)) for p in sorted(free)}
     if lit is None:
         _light(spec)
         _add_sky(spec, house, getattr(catalogue, "cache", None))
-        parts = house_parts(house, catalogue) if parts is None else parts
-        own = lambda p: bodies.get(p.owner) or (hung.get((p.owner, p.yaw)) if doors.is_leaf(p) else None)
+        parts = house_parts(house, catalogue, apart) if parts is None else parts
+        own = lambda p: bodies.get(p.owner) or (hung.get((p.owner, p.position)) if doors.is_leaf(p) else None)
         carried = [(p, own(p)) for p in parts if p.owner not in cases]
-        _add_parts(spec, [*carried, *(x for case in cases.values() if parts for x in cupboards.parts_of(case))])
+        _add_parts(spec, [*carried, *(x for case in cases.values() if parts for x in cupboards.parts_of(case)), *lying])
     else:
         spec.visual.headlight.active = 0
         spec.add_material(name=PROBE_LIT, emission=1.0, specular=0.0, shininess=0.0)
         frames: dict[str, tuple[Part | Placement, Hung]]
-        frames = {p.owner: (p, hung[p.owner, p.yaw]) for p in shell if doors.is_leaf(p) and (p.owner, p.yaw) in hung}
+        frames = {
+            p.owner: (p, hung[p.owner, p.position]) for p in shell if doors.is_leaf(p) and (p.owner, p.position) in hung
+        }
         frames |= {p: (house.placement_by_id[p], body) for p, body in bodies.items()}
         _add_pages(spec, lit, house, lambda m: _lit_pieces(m, frames, cases))
-        _add_insides(spec, cases)
+        _add_insides(spec, cases, lying)
     if collisions:
         _add_collisions(spec, house, catalogue, bodies, cases, YIELDING if hung else ())
         _add_leaves(spec, shell, hung)
@@ -240,16 +246,10 @@ def _light(spec: mujoco.MjSpec) -> None:
     """Soft light from all sides without shadows, the same for every camera: cube faces join."""
     head = spec.visual.headlight
     head.active, head.ambient, head.diffuse, head.specular = 1, [0.63, 0.62, 0.60], [0.0] * 3, [0.0] * 3
+    kind = {"type": mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, "castshadow": False, "pos": [0, 0, 3]}
     for direction, strength in LIGHTS:
-        spec.worldbody.add_light(
-            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-            dir=direction,
-            pos=[0, 0, 3],
-            castshadow=False,
-            ambient=[0, 0, 0],
-            diffuse=[strength, strength * 0.985, strength * 0.95],
-            specular=[0.1] * 3,
-        )
+        colour = [strength, strength * 0.985, strength * 0.95]
+        spec.worldbody.add_light(**kind, dir=direction, ambient=[0] * 3, diffuse=colour, specular=[0.1] * 3)
 
 
 def _add_sky(spec: mujoco.MjSpec, house: House, cache: Path | None) -> None:
@@ -259,15 +259,8 @@ def _add_sky(spec: mujoco.MjSpec, house: House, cache: Path | None) -> None:
     below = np.tile(np.array([0, 0, -1], np.float32), (len(vertices), 1))  # one normal, so that all of it is lit alike
     _add_mesh(spec, "landscape", vertices, below, uv, faces)
     _draw(spec.worldbody, f"{backdrop.DOME}#0", "landscape", "landscape", (1, 1, 1, 1))
-    spec.add_texture(
-        name="sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=[0.50, 0.68, 0.90],
-        rgb2=[0.93, 0.95, 0.97],
-        width=128,
-        height=128,
-    )
+    kind = {"type": mujoco.mjtTexture.mjTEXTURE_SKYBOX, "builtin": mujoco.mjtBuiltin.mjBUILTIN_GRADIENT}
+    spec.add_texture(name="sky", **kind, rgb1=[0.50, 0.68, 0.90], rgb2=[0.93, 0.95, 0.97], width=128, height=128)
 
 
 LIGHTS = (((0.35, 0.5, -0.8), 0.34), ((-0.85, -0.5, 0.15), 0.30), ((0.0, 0.0, 1.0), 0.30))
@@ -309,18 +302,8 @@ def _add_parts(spec: mujoco.MjSpec, bodied: Sequence[tuple[Part, Hung | None]]) 
 
 def _draw(body: mujoco.MjsBody, name: str, mesh: str, material: str, rgba: Sequence[float], **pose: Any) -> None:
     """A visual geom: it touches nothing and weighs nothing."""
-    body.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_MESH,
-        meshname=mesh,
-        material=material,
-        rgba=rgba,
-        group=VISUAL,
-        contype=0,
-        conaffinity=0,
-        mass=0,
-        **pose,
-    )
+    kind = {"type": mujoco.mjtGeom.mjGEOM_MESH, "group": VISUAL, "contype": 0, "conaffinity": 0, "mass": 0}
+    body.add_geom(name=name, **kind, meshname=mesh, material=material, rgba=rgba, **pose)
 
 
 def _is_drawable(mesh: MeshPart) -> bool:
@@ -364,13 +347,9 @@ class _Looks:
         key = (finish.texture, gloss, glow, finish.metallic > 0.5)
         if key not in self._materials:
             name = self._materials[key] = f"material_{len(self._materials)}"
-            material = self._spec.add_material(
-                name=name,
-                rgba=[1, 1, 1, 1] if finish.texture else [0.5, 0.5, 0.5, 1],
-                emission=0.9 if glow else 0.0,
-                specular=gloss,
-                shininess=max(0.05, 1 - finish.roughness),
-            )
+            shine = {"emission": 0.9 * glow, "specular": gloss, "shininess": max(0.05, 1 - finish.roughness)}
+            rgba = [1, 1, 1, 1] if finish.texture else [0.5, 0.5, 0.5, 1]
+            material = self._spec.add_material(name=name, rgba=rgba, **shine)
             if finish.texture:
                 material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = self._texture(finish.texture)
         red, green, blue = (1.0 if finish.texture else float(c) for c in finish.color[:3])
@@ -446,9 +425,10 @@ def _lit_pieces(
     return [(dataclasses.replace(m, vertices=vertices), carrier)]
 
 
-def _add_insides(spec: mujoco.MjSpec, cases: Mapping[str, Case]) -> None:
-    """Draw insides of closed furniture, which were not lit, in a plain colour, as bodies added to a lit house."""
-    hidden = (x for case in cases.values() for x in cupboards.parts_of(case, hidden=True))
+def _add_insides(spec: mujoco.MjSpec, cases: Mapping[str, Case], lying: Sequence[tuple[Part, Hung]]) -> None:
+    """Draw insides of closed furniture and what lies there, which were not lit, in a plain colour, as bodies added to a
+    lit house."""
+    hidden = (*(x for case in cases.values() for x in cupboards.parts_of(case, hidden=True)), *lying)
     for k, (part, carrier) in enumerate(hidden):
         mesh, finish = part.mesh, part.mesh.finish
         color = (
@@ -529,13 +509,14 @@ def _add_collisions(
             _add_boxes(spec.worldbody, p.id, boxes, position=p.position, yaw=p.yaw)
 
 
-def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part], hung: Mapping[tuple[str, float], Hung]) -> None:
+def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part], hung: Mapping[doors.LeafKey, Hung]) -> None:
     """One box for every door leaf and window pane, as it stands; of doors on hinges, for the levers, too."""
     count: dict[str, int] = {}
     for part in parts:
-        leaf = hung.get((part.owner, part.yaw)) if doors.is_leaf(part) else None
+        leaf = hung.get((part.owner, part.position)) if doors.is_leaf(part) else None
         if leaf is not None:
-            box, first = collision.bounding_box(part.mesh.vertices), len(leaf.body.geoms)
+            box = collision.bounding_box(part.mesh.vertices)
+            first = count[part.owner] = count.get(part.owner, len(leaf.body.geoms) - 1) + 1
             _add_boxes(leaf.body, part.owner, [box], density=doors.LEAF_DENSITY, position=leaf.origin, first=first)
         elif part.kind == "opening" and part.owner.endswith(LEAVES):
             first = count[part.owner] = count.get(part.owner, -1) + 1
@@ -562,17 +543,9 @@ def _add_boxes(
     first: int = 0,
 ) -> None:
     """Boxes of a frame at `position`, turned by `yaw`."""
-    c, s = math.cos(yaw), math.sin(yaw)
+    c, s, kind = math.cos(yaw), math.sin(yaw), {"type": mujoco.mjtGeom.mjGEOM_BOX, "group": COLLISION}
+    kind |= {"rgba": [0.6, 0.7, 0.9, 0.4], "density": density, "friction": [0.9, 0.005, 0.0001]}
     for k, box in enumerate(boxes, first):
         x, y, z = box.centre
-        body.add_geom(
-            name=f"{owner}#box{k}",
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=[position[0] + c * x - s * y, position[1] + s * x + c * y, position[2] + z],
-            quat=yaw_quat(yaw + box.yaw),
-            size=box.half,
-            group=COLLISION,
-            rgba=[0.6, 0.7, 0.9, 0.4],
-            density=density,
-            friction=[0.9, 0.005, 0.0001],
-        )
+        pos = [position[0] + c * x - s * y, position[1] + s * x + c * y, position[2] + z]
+        body.add_geom(name=f"{owner}#box{k}", **kind, pos=pos, quat=yaw_quat(yaw + box.yaw), size=box.half)

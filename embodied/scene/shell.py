@@ -28,13 +28,14 @@ SKIRTING_HEIGHT = 0.08
 SKIRTING_THICKNESS = 0.014
 
 
-def shell_parts(house: House, finish: FinishOf) -> tuple[Part, ...]:
-    """All parts that are no placements: rooms, openings, stairs, outdoors, in `shell_owners` order."""
+def shell_parts(house: House, finish: FinishOf, apart: bool = False) -> tuple[Part, ...]:
+    """All parts that are no placements: rooms, openings, stairs, outdoors, in `shell_owners` order; `apart`: as of
+    joinery.opening_parts."""
     parts: list[Part] = []
     for room in house.rooms:
         parts += room_parts(house, room, finish)
     for opening in house.openings:
-        parts += joinery.opening_parts(house, opening, finish)
+        parts += joinery.opening_parts(house, opening, finish, apart)
     for stair in house.stairs:
         parts += stairs.stair_parts(house, stair, finish)
     parts += outdoors.outdoor_parts(house, finish)
