@@ -176,9 +176,7 @@ def _refuse_deep(value: object) -> None:
     raise ValueError(f"lists and objects are nested more than {MOST_NESTED} deep")
 
 
-@functools.cache
-def _hints(kind: type) -> dict[str, object]:
-    return typing.get_type_hints(kind)
+_hints = functools.cache(typing.get_type_hints)
 
 
 def _build(kind: typing.Any, value: object, where: str) -> typing.Any:

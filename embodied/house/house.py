@@ -512,17 +512,10 @@ def _check_walls(house: House, polygons: dict[str, shapely.Polygon]) -> Iterator
 
 def _check_reach(house: House) -> Iterator[str]:
     """Every room can be reached from the first one through doors and stairs."""
-    ways: dict[str, list[str]] = {r.id: [] for r in house.rooms}
-    pairs = [o.rooms for o in house.openings if o.kind in DOORS]
-    for a, b in (*pairs, *(s.rooms for s in house.stairs)):
-        if b is not None:
-            ways[a].append(b)
-            ways[b].append(a)
-    reached, todo = {house.rooms[0].id}, [house.rooms[0].id]
-    while todo:
-        new = [r for r in ways[todo.pop()] if r not in reached]
-        reached.update(new)
-        todo += new
+    ways = [{*o.rooms} - {None} for o in house.openings if o.kind in DOORS] + [{*s.rooms} for s in house.stairs]
+    reached: set[str | None] = {house.rooms[0].id}
+    while new := {room for way in ways if way & reached for room in way - reached}:
+        reached |= new
     if lost := [r.id for r in house.rooms if r.id not in reached]:
         yield f"rooms {lost} cannot be reached from {house.rooms[0].id!r} through doors; add one"
 

@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from embodied.scene.far_canvas import DrawList, FarCanvas, FarLight, transmittance
-from embodied.scene.far_trees import FIR, SNOW, tree
+from embodied.scene.far_canvas import FIR, SNOW, DrawList, FarCanvas, FarLight, transmittance, tree
 from embodied.scene.landscapes import Ridge, Scenery
 
 DRY = 0.2

@@ -42,9 +42,8 @@ def compare(
     whole = s.light.soft + AMBIENT + s.light.sun[:, None] * s.outdoors.sun * radiosity.GLAZING
     bright = whole @ y
     level = {u: np.median(bright[s.lux.shell & (s.lux.unit == u)]) for u in np.unique(s.lux.unit[s.lux.shell])}
-    lit = np.array([level.get(u, 0.0) for u in range(int(s.lux.unit.max()) + 1)]) > 0.05 * np.median(
-        bright[s.lux.shell]
-    )
+    middle = np.median(bright[s.lux.shell])
+    lit = np.array([level.get(u, 0.0) for u in range(int(s.lux.unit.max()) + 1)]) > 0.05 * middle
     fit = s.lux.shell & s.light.good & lit[s.lux.unit]
     # beside a shadow's edge a luxel's mean and its centre differ by nature
     fit &= (s.light.sun < 1e-3) | (s.light.sun > 0.98 * np.clip(s.lux.normal @ s.outdoors.sun_direction, 0, 1))

@@ -137,9 +137,8 @@ def page_of(number: int, composer: Composer) -> Ingredients:
     whole = np.zeros(c.shape, np.uint8)
     if sun is not None:
         whole.ravel()[c.index] = (sun * 255 + 0.5).astype(np.uint8)
-    shown_by = (
-        nearest_luxel if page.fineness == 1 else composer.kept("texels", number, lambda: sources(c.index, c.shape))
-    )
+    nearest_texel = lambda: sources(c.index, c.shape)
+    shown_by = nearest_luxel if page.fineness == 1 else composer.kept("texels", number, nearest_texel)
 
     def page_like(codes: np.ndarray) -> np.ndarray:
         codes = codes[shown_by] if len(codes) else shown_by.astype(np.uint32)
@@ -394,7 +393,6 @@ def _sharp_sun(composer: Composer, page: Page, coarse: Texels, c: Cover, share: 
     out, i = whole[..., 0][at], np.nonzero(unsure[at])[0]
     if len(i):
         p = points_of(*surface(page, c, i), page.thin[c.face[i]])
-        out[i] = np.asarray(
-            radiosity.sun_share(composer.space.scene, p, composer.portals, towards, composer.settings.sun_rays)
-        )
+        rays, scene = composer.settings.sun_rays, composer.space.scene
+        out[i] = np.asarray(radiosity.sun_share(scene, p, composer.portals, towards, rays))
     return out

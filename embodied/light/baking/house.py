@@ -338,10 +338,8 @@ def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Radiosity) -
     """85th percentile of e (without the sun's own) on the shell of every room; up to a third more where much is far
     brighter than that (`brightest`)."""
     e = light.soft
-    room_of_owner = np.array(
-        [[r.id for r in house.rooms].index(r) if r in house.room_by_id else -1 for r in atlas.rooms]
-    )
-    room = room_of_owner[lux.owner]
+    number = {r.id: i for i, r in enumerate(house.rooms)}
+    room = np.array([number.get(r, -1) for r in atlas.rooms])[lux.owner]
     out = {}
     for i, r in enumerate(house.rooms):
         lit = (room == i) & lux.shell & light.good

@@ -36,7 +36,7 @@ from embodied.light.settings import LightSettings
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.emitters import GLAZING, Lamp, Portal, portals_of
 from embodied.light.tracing.luxels import AMBIENT
-from embodied.light.tracing.radiosity import LIFT, NOTHING, Met, Patches, Points, Space, env_lookup, hit_luxel
+from embodied.light.tracing.radiosity import LIFT, NOTHING, Met, Patches, Points, Space, env_lookup
 
 SPACING, MARGIN = 0.5, 0.1
 """Metres between probes, about, and from walls, floor and ceiling to the first of them."""
@@ -191,16 +191,7 @@ def patches_at(scene: RayScene, patches: Patches, p: Points) -> np.ndarray:
 
 def meet_around(space: Space, p: Points, rays: int) -> Met:
     """Send rays from places, evenly in all directions."""
-    luxels, lane, count = dr.zeros(mi.UInt32, rays * p.n), dr.arange(mi.UInt32, p.n), opaque_uint(p.n)
-
-    def one(k: Array) -> tuple[Array, ...]:
-        luxel, hit, front, near = hit_luxel(space, mi.Ray3f(p.position, _everywhere(p, k)))
-        dr.scatter(luxels, dr.select(hit & front, luxel, NOTHING), k * count + lane)
-        return (dr.select(hit & (~front | near), 1.0, 0.0),)
-
-    (bad,) = accumulate(rays, one, dr.zeros(mi.Float, p.n))
-    dr.eval(luxels)
-    return Met(rays, luxels, np.array(bad))
+    return radiosity.met_by(space, p.n, rays, lambda k: mi.Ray3f(p.position, _everywhere(p, k)))
 
 
 def bounced_at(met: Met, p: Points, table: Array) -> np.ndarray:

@@ -17,7 +17,7 @@ from embodied.light.settings import LightSettings
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.emitters import Lamp, Portal, portals_of
 from embodied.light.tracing.luxels import AMBIENT, Luxels, points
-from embodied.light.tracing.radiosity import Met, Patches, Points, Space, Together
+from embodied.light.tracing.radiosity import Met, Patches, Points, Space, Together, meet
 from embodied.light.tracing.sky import Outdoors
 
 SPARKS = 0.01
@@ -74,9 +74,7 @@ class BakeInput:
     @functools.cached_property
     def near(self) -> Met:
         """Hits of the rays that carry light from bounce to bounce."""
-        return get_or_compute(
-            self.memory, "near", lambda: radiosity.meet(self.space, self.points, self.settings.bounce_rays)
-        )
+        return get_or_compute(self.memory, "near", lambda: meet(self.space, self.points, self.settings.bounce_rays))
 
     @functools.cached_property
     def free(self) -> np.ndarray:
@@ -87,9 +85,7 @@ class BakeInput:
     def far(self) -> Met:
         """Hits of the other rays of the luxels `free`."""
         first, last = self.settings.bounce_rays, self.settings.seen_rays
-        return get_or_compute(
-            self.memory, "far", lambda: radiosity.meet(self.space, self.at(self.free), last - first, first)
-        )
+        return get_or_compute(self.memory, "far", lambda: meet(self.space, self.at(self.free), last - first, first))
 
     def reached(self, sees: Callable[[np.ndarray], np.ndarray], tries: int = LUXELS_TRIED) -> np.ndarray:
         """Numbers of the luxels that may be seen and that a light may reach.
@@ -98,17 +94,13 @@ class BakeInput:
           sees: from luxel numbers (k,) to whether each is reached, (k,) bool.
           tries: luxels of every room and opening that are asked.
         """
-        free, units = self.free, self._units
+        free = self.free
+        units = self.lux.unit[free].astype(np.int16)  # which are sorted ten times as fast
         if not len(free):
             return free
         memory = self._own if self.memory is None else self.memory
         some = get_or_compute(memory, ("tried", tries), lambda: radiosity.tried(units, tries))
         return free[radiosity.reached(units, some, sees(free[some]))]
-
-    @functools.cached_property
-    def _units(self) -> np.ndarray:
-        """Of the luxels `free`."""
-        return self.lux.unit[self.free].astype(np.int16)  # which are sorted ten times as fast
 
     def at(self, luxels: np.ndarray) -> Points:
         """Some luxels on the device, by their numbers."""
@@ -138,9 +130,7 @@ def shone_on(inputs: BakeInput, source: Portal | Lamp) -> tuple[np.ndarray, np.n
 
     if radiance is None or inputs.memory is None:
         return shone()
-    which, e = get_or_compute(
-        inputs.memory, ("shone", source.id), shone
-    )  # of the same lamp with another colour or power
+    which, e = get_or_compute(inputs.memory, ("shone", source.id), shone)  # whatever its colour or power was
     return which, e * radiance
 
 
@@ -154,10 +144,9 @@ def outer_light(inputs: BakeInput, samples: int = 24) -> np.ndarray:
     e = np.zeros((len(lux.position), 3), np.float32)
     into = {o.id: inward(house, o) for o in house.openings if None in o.rooms}
     outer = [k == "opening" and o.split("/")[0] in into for o, k in zip(atlas.owners, atlas.kinds)]
-    inwards = np.array([into[o.split("/")[0]] if x else [np.nan] * 2 for o, x in zip(atlas.owners, outer)]).reshape(
-        -1, 2
-    )
-    outer_side = np.nonzero((lux.face_normal[:, :2] * inwards[lux.owner]).sum(1) < 0.7)[0]
+    inwards = [into[o.split("/")[0]] if x else [np.nan] * 2 for o, x in zip(atlas.owners, outer)]
+    inward_of = np.array(inwards).reshape(-1, 2)[lux.owner]
+    outer_side = np.nonzero((lux.face_normal[:, :2] * inward_of).sum(1) < 0.7)[0]
     if not len(outer_side):
         return e
     ways = portals_of(house)
@@ -244,10 +233,8 @@ def bounce(inputs: BakeInput, soft: np.ndarray, tell: Callable[[float], None]) -
     for k in range(BOUNCE_ROUNDS):
         tell(k / (BOUNCE_ROUNDS + 1))
         table = seen + lux.albedo * e
-        e = (
-            radiosity.gather(near, floats(table if k < BOUNCE_ROUNDS - 1 else clamp_fireflies(lux, table)))[0]
-            / near.rays
-        )
+        calm = table if k < BOUNCE_ROUNDS - 1 else clamp_fireflies(lux, table)
+        e = radiosity.gather(near, floats(calm))[0] / near.rays
         if k == 0:
             e += _infinite_bounces(lux, e, near.bad < 0.5 * near.rays)
     tell(BOUNCE_ROUNDS / (BOUNCE_ROUNDS + 1))

@@ -17,6 +17,9 @@ from embodied.light.settings import light_code
 from embodied.scene.house_meshes import owners
 from embodied.scene.lit_pages import LitMesh
 
+GAINS = ("levels", "gains", "outdoors")
+"""Arrays of an `Exposure`."""
+
 
 def kept_light(folder: Path | None, n: int, work: Callable[[], Radiosity]) -> Radiosity:
     """Result of `work`, from disk if an interrupted run left it there whole."""
@@ -45,12 +48,7 @@ def facts_of(s: LightSolution, meshes: Sequence[LitMesh], folder: Path) -> dict[
         "own_pages": len(s.atlas.pages),
         "owners": list(owners(s.house)),
         "luxels": len(s.lux.position),
-        "exposure": {
-            "polygons": s.exposure.polygons,
-            "levels": s.exposure.levels.tolist(),
-            "gains": s.exposure.gains.tolist(),
-            "outdoors": s.exposure.outdoors.tolist(),
-        },
+        "exposure": {"polygons": s.exposure.polygons, **{k: getattr(s.exposure, k).tolist() for k in GAINS}},
         "meshes": [
             {"owner": m.owner, "kind": m.kind, "room": m.room, "page": m.page, "alpha": m.alpha, "gloss": m.gloss}
             for m in meshes

@@ -21,8 +21,7 @@ from embodied.light.pages.unwrap import SPARSEST, areas_of
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.radiosity import LIFT, Together, points_of, small_sky
 from embodied.light.tracing.sky import Outdoors
-from embodied.scene.backdrop import DOME, dome
-from embodied.scene.far_towns import GLOW
+from embodied.scene.backdrop import DOME, GLOW, dome
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 
@@ -65,9 +64,8 @@ def outside_of(
     density = float(min(14.0, np.sqrt(LUXELS * sharpness**2 / max(area, 1.0))))
     budget = round(min(1500.0, (density / SPARSEST) ** 2))  # of trees and hedges, no finer than the rest
     unfold = functools.partial(things_of, budget=budget, cache=cache, finest=2)
-    atlas = atlas_of(
-        unfold([_flat(p) for p in near], density=density) + unfold([_flat(p) for p in far], density=COARSER * density)
-    )
+    things = unfold([_flat(p) for p in near], density=density)
+    atlas = atlas_of(things + unfold([_flat(p) for p in far], density=COARSER * density))
     sheets = sheets_of(atlas.pages)
     covers = tuple(cover(p, p.fineness, s) for p, s in zip(atlas.pages, sheets))
     return Outside(

@@ -21,7 +21,8 @@ SHELL = ("wall", "floor", "ceiling")
 
 
 PRINT_AREA, PRINT_THICKNESS = 1.5, 0.06
-"""The most that prints measure: square metres of a side, and metres along the world's axis that is nearest to none."""
+"""The most that prints measure, patterned things that are looked at as pictures are, such as posters and books: square
+metres of a side, and metres along the world's axis that is nearest to none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,15 +193,12 @@ def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: f
     side = np.sqrt(flat_areas(flat.luxels).sum() / used.sum())
     if sum(a for a, f in zip(used, finishes) if f.mirror) > 0.15 * used.sum():
         return int(np.clip(round(400 * sharpness / side), 2, 8))
-    if patterned:
-        return int(
-            np.clip(
-                round((360 if _is_print(flat, used) else 180) * sharpness / side),
-                1 if side > 80 * sharpness else 2,
-                max(8 if _is_print(flat, used) else 4, round(160 * sharpness / density)),
-            )
-        )
-    return 1 if side > 80 * sharpness else 2
+    least = 1 if side > 80 * sharpness else 2
+    if not patterned:
+        return least
+    is_print = used.sum() < 2 * PRINT_AREA and np.ptp(flat.corners.reshape(-1, 3), axis=0).min() < PRINT_THICKNESS
+    most = max(8 if is_print else 4, round(160 * sharpness / density))
+    return int(np.clip(round((360 if is_print else 180) * sharpness / side), least, most))
 
 
 def flat_areas(corners: np.ndarray) -> np.ndarray:
@@ -212,11 +210,6 @@ def flat_areas(corners: np.ndarray) -> np.ndarray:
 def _is_face(uv: np.ndarray) -> bool:
     """True for a person's skin and eyes, which wear one picture; they have luxels of their own and finer texels."""
     return bool(uv.min() >= 0.0 and uv.max() <= 1.0)
-
-
-def _is_print(flat: Unwrapped, areas: np.ndarray) -> bool:
-    """True for a patterned thing that is flat and small enough to be looked at as pictures are: posters, books."""
-    return areas.sum() < 2 * PRINT_AREA and np.ptp(flat.corners.reshape(-1, 3), axis=0).min() < PRINT_THICKNESS
 
 
 def _page(
@@ -271,11 +264,8 @@ def meshes_of(atlas: Atlas, first: int) -> tuple[list[LitMesh], list[np.ndarray]
             thin = page.thin[owned]
             faces = np.concatenate([faces, faces[thin][:, ::-1]])
             real = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-            alpha = (
-                min(f.color[3] for f in (page.finishes[k] for k in np.unique(page.finish[owned])))
-                if page.glass
-                else 1.0
-            )
+            alphas = [page.finishes[k].color[3] for k in np.unique(page.finish[owned])]
+            alpha = min(alphas) if page.glass else 1.0
             kind, area = kinds[owned], areas[owned]
             mean = tuple(((kind[:, :2] * area[:, None]).sum(0) / max(area.sum(), 1e-12) / 255).round(3).tolist())
             whose = atlas.owners[o], atlas.kinds[o], atlas.rooms[o]

@@ -104,29 +104,20 @@ def lights_of(
     """
     k = len(portals) + len(lamps)
     zero = np.zeros(3)
-    scenes, index = [scene], [0] * len(portals)
-    for x in lamps:
-        if x.owner is not None:
-            scenes.append(without.get(x.owner, scene))
-            index.append(len(scenes) - 1)
-        else:
-            index.append(0)
+    bare = [x.owner is not None for x in lamps]
+    scenes = [scene, *(without.get(x.owner, scene) for x in lamps if x.owner is not None)]
+    index = [0] * len(portals) + (np.cumsum(bare) * bare).tolist()
     sky = float(outdoors.picture.mean())
-    centre = np.array([p.corner + (p.along + p.up) / 2 for p in portals] + [x.points.mean(0) for x in lamps]).reshape(
-        k, 3
-    )
-    power = np.maximum(
-        [p.area * sky for p in portals]
-        + [float(x.radiance.mean()) * x.area * (4 if x.owner or not x.normals.any() else 1) for x in lamps],
-        1e-6,
-    )
+    centres = [p.corner + (p.along + p.up) / 2 for p in portals] + [x.points.mean(0) for x in lamps]
+    power = [p.area * sky for p in portals]
+    power += [float(x.radiance.mean()) * x.area * (4 if x.owner or not x.normals.any() else 1) for x in lamps]
     fill = lambda a: a[np.arange(POINTS) % len(a)]
     ways = radiosity.portal_scene(portals) if portals and outdoors.sun.any() else None
     none = [zero] * len(lamps)
     return Lights(
         k,
-        floats(centre),
-        floats(power),
+        floats(centres),
+        floats(np.maximum(power, 1e-6)),
         floats([p.corner for p in portals] + none),
         floats([p.along for p in portals] + none),
         floats([p.up for p in portals] + none),
@@ -180,9 +171,8 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
     at = lambda t: dr.gather(mi.Vector3f, t, pick)
     lamp, bare = dr.gather(mi.Bool, lights.lamp, pick), dr.gather(mi.Bool, lights.bare, pick)
     spot = pick * POINTS + dr.minimum(mi.UInt32(a * POINTS), POINTS - 1)
-    q = dr.select(
-        lamp, dr.gather(mi.Vector3f, lights.points, spot), at(lights.corner) + at(lights.along) * a + at(lights.up) * b
-    )
+    on_portal = at(lights.corner) + at(lights.along) * a + at(lights.up) * b
+    q = dr.select(lamp, dr.gather(mi.Vector3f, lights.points, spot), on_portal)
     n = dr.select(lamp, dr.gather(mi.Vector3f, lights.normals, spot), at(lights.normal))
     d, far, cos, side, active = radiosity.towards(p, mi.Point3f(q))
     leaving = dr.select(bare, 1.0, -dr.dot(n, d))
@@ -194,12 +184,8 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
     blocked = mi.Bool(False)
     for i, scene in enumerate(lights.scenes):
         blocked |= scene.ray_test(ray, active & (which == i))
-    g = (
-        cos
-        * leaving
-        / dr.maximum(dr.square(far), dr.select(bare, 0.06, 1e-4))
-        * dr.gather(mi.Float, lights.strength, pick)
-    )
+    g = cos * leaving / dr.maximum(dr.square(far), dr.select(bare, 0.06, 1e-4))
+    g = g * dr.gather(mi.Float, lights.strength, pick)
     g *= dr.select(lamp, dr.gather(mi.Float, lights.weights, spot), 1.0)
     light = dr.select(lamp, at(lights.radiance), mi.Vector3f(radiosity.env_lookup(space.env, d, active)))
     return mi.Color3f(dr.select(active & ~blocked, light * dr.minimum(g, dr.select(bare, 400.0, 4.0)) / chance, 0.0))
@@ -226,22 +212,11 @@ def irradiance(
         total = total + dr.select(alive, throughput * direct(space, lights, p, rng=rng), 0.0)
         u = rng.random((4, p.n), np.float32)
         side = dr.select(p.thin & (floats(u[2]) < 0.5), -1.0, 1.0)
-        out = p.face_normal * side
-        d = mi.Frame3f(p.normal * side).to_world(
-            mi.warp.square_to_cosine_hemisphere(mi.Point2f(floats(u[0]), floats(u[1])))
-        )
-        rise = dr.dot(d, out)
-        d = dr.normalize(dr.select(rise < 0.01, d - out * (rise - 0.02), d))
-        ray = mi.Ray3f(p.position + out * radiosity.LIFT, d)
+        ray = radiosity.cosine_ray(p, side, mi.Point2f(floats(u[0]), floats(u[1])))
         luxel, alive, q = hit_points(space, surfaces, ray, alive, p)
-        throughput = throughput * dr.gather(mi.Color3f, surfaces.albedo, luxel, alive)
-        total = total + dr.select(
-            alive,
-            throughput
-            / dr.maximum(dr.gather(mi.Color3f, surfaces.albedo, luxel, alive), 1e-4)
-            * dr.gather(mi.Color3f, surfaces.glow, luxel, alive),
-            0.0,
-        )
+        albedo, glow = (dr.gather(mi.Color3f, a, luxel, alive) for a in (surfaces.albedo, surfaces.glow))
+        throughput = throughput * albedo
+        total = total + dr.select(alive, throughput / dr.maximum(albedo, 1e-4) * glow, 0.0)
         if depth >= 2:
             keep = dr.clip(dr.max(throughput) * 1.5, 0.05, 0.95)
             alive &= floats(u[3]) < keep

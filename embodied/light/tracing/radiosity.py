@@ -352,17 +352,36 @@ def meet(space: Space, p: Points, rays: int, first: int = 0) -> Met:
     Args:
       first: index of the first point of the R2 sequence, so that later rays of the same points differ.
     """
-    one_ray, luxels = _rays(space, p, first), dr.zeros(mi.UInt32, rays * p.n)
-    lane, count = dr.arange(mi.UInt32, p.n), opaque_uint(p.n)
+    start = opaque_uint(first)
+
+    def ray(k: Array) -> Ray:
+        side = dr.select(p.thin & (((k + start) & 1) == 1), -1.0, 1.0)
+        return cosine_ray(p, side, p.sample(k + start))
+
+    return met_by(space, p.n, rays, ray)
+
+
+def met_by(space: Space, n: int, rays: int, ray: Callable[[Array], Ray]) -> Met:
+    """Send so many rays from each of n points: the k-th of all of them is `ray` of k."""
+    luxels, lane, count = dr.zeros(mi.UInt32, rays * n), dr.arange(mi.UInt32, n), opaque_uint(n)
 
     def one(k: Array) -> tuple[Array, ...]:
-        luxel, seen, wrong = one_ray(k)
-        dr.scatter(luxels, dr.select(seen, luxel, NOTHING), k * count + lane)
-        return (wrong,)
+        luxel, hit, front, near = hit_luxel(space, ray(k))
+        dr.scatter(luxels, dr.select(hit & front, luxel, NOTHING), k * count + lane)
+        return (dr.select(hit & (~front | near), 1.0, 0.0),)
 
-    (bad,) = accumulate(rays, one, dr.zeros(mi.Float, p.n))
+    (bad,) = accumulate(rays, one, dr.zeros(mi.Float, n))
     dr.eval(luxels)
     return Met(rays, luxels, np.array(bad))
+
+
+def cosine_ray(p: Points, side: Array, u: Array) -> Ray:
+    """Rays from points on a `side` (1 or -1) of them, as likely as their cosine, for numbers (a Point2f) in [0, 1)."""
+    out = p.face_normal * side
+    d = mi.Frame3f(p.normal * side).to_world(mi.warp.square_to_cosine_hemisphere(u))
+    rise = dr.dot(d, out)
+    d = dr.normalize(dr.select(rise < 0.01, d - out * (rise - 0.02), d))
+    return mi.Ray3f(p.position + out * LIFT, d)
 
 
 def gather(met: Met, table: Array) -> tuple[np.ndarray, np.ndarray]:
@@ -381,23 +400,6 @@ def gather(met: Met, table: Array) -> tuple[np.ndarray, np.ndarray]:
 
     total, square = accumulate(met.rays, one, dr.zeros(mi.Color3f, n), dr.zeros(mi.Float, n))
     return array(total), np.array(square)
-
-
-def _rays(space: Space, p: Points, first: int) -> Callable:
-    """From the number of a sample to the luxels that cosine-distributed rays meet, whether they see them, and 1 where
-    they meet a back face or something nearer than 12 mm."""
-    start = opaque_uint(first)
-
-    def meet(k: Array) -> tuple[Array, ...]:
-        side = dr.select(p.thin & (((k + start) & 1) == 1), -1.0, 1.0)
-        d = mi.Frame3f(p.normal * side).to_world(mi.warp.square_to_cosine_hemisphere(p.sample(k + start)))
-        out = p.face_normal * side
-        rise = dr.dot(d, out)
-        d = dr.normalize(dr.select(rise < 0.01, d - out * (rise - 0.02), d))
-        luxel, hit, front, near = hit_luxel(space, mi.Ray3f(p.position + out * LIFT, d))
-        return luxel, hit & front, dr.select(hit & (~front | near), 1.0, 0.0)
-
-    return meet
 
 
 def hit_luxel(space: Space, ray: Ray, active: Array = True, met: Array = None) -> Array:

@@ -75,14 +75,8 @@ def paint(sky: Sky, seed: int, place: Scenery, height: int = HEIGHT) -> Outdoors
     towards, up = sun_direction(sky), sun_height(sky.hour)
     elevation = (0.5 - (np.arange(height // 2) + 0.5) / height) * np.pi
     yaw = np.pi - (np.arange(2 * height) + 0.5) / height * np.pi
-    directions = np.stack(
-        [
-            np.cos(elevation)[:, None] * np.cos(yaw),
-            np.cos(elevation)[:, None] * np.sin(yaw),
-            np.broadcast_to(np.sin(elevation)[:, None], (height // 2, 2 * height)),
-        ],
-        axis=-1,
-    ).astype(np.float32)
+    flat, upwards = np.cos(elevation)[:, None], np.tile(np.sin(elevation)[:, None], 2 * height)
+    directions = np.stack([flat * np.cos(yaw), flat * np.sin(yaw), upwards], axis=-1).astype(np.float32)
     sun = sun_strength(sky, up)
     above = _sky(sky, up, directions, towards, seed)
     air = cv2.resize(above[-max(height // 256, 1) :].mean(0)[None], (4 * height, 1), interpolation=cv2.INTER_LINEAR)[0]
