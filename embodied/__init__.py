@@ -32,8 +32,8 @@ Other
     stream                         named random generators of one seed
 
 Each name is imported when it is first used; `help(embodied.open_world)` shows an example. Environments:
-embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0, Ask-v0, Doors-v0, VLNCE-v0, ObjectNav-v0, Drive-v0 and
-Robot-v0, registered by `import embodied`.
+embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0, Ask-v0, Doors-v0, Social-v0, VLNCE-v0, ObjectNav-v0, SocialNav-v0,
+FollowNav-v0, Drive-v0 and Robot-v0, registered by `import embodied`.
 """
 
 from __future__ import annotations

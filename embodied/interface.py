@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar, runtime_checkabl
 
 import numpy as np
 
+from embodied.people.strolls import Stroll
+
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
     from embodied.house.house import House
@@ -284,7 +286,15 @@ class AnswerQuestion:
     """Things that the answer rests on."""
 
 
-Goal = FindObject | FollowRoute | FindDescribed | GoTo | FindInTurn | AnswerQuestion
+@dataclass(frozen=True)
+class AmongPeople:
+    """Go to the goal node without touching anybody."""
+
+    strolls: tuple[Stroll, ...]
+    """Who walks about meanwhile."""
+
+
+Goal = FindObject | FollowRoute | FindDescribed | GoTo | FindInTurn | AnswerQuestion | AmongPeople
 
 
 @dataclass(frozen=True)

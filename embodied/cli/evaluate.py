@@ -110,7 +110,7 @@ class OfTrained:
 @dataclass(frozen=True, kw_only=True)
 class EvaluateOptions(TaskOptions, Results, OfTrained, WithModel, Encoded, Threaded, Furnished):
     kind: Annotated[str, Option(metavar="KIND", name="kind")]
-    """The kind of task: find, goat, eqa, vln, vnla, hanna, hari, ask, doors, vqa, or MODULE:NAME of your own."""
+    """The kind of task: find, goat, eqa, vln, vnla, hanna, hari, ask, doors, social, vqa, or your MODULE:NAME."""
     agent: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
     """Agents to evaluate: baselines by name, 'shipped', a file or run folder of `embodied train`, 'llm', MODULE:CLASS
     of your own policy, MODULE:LEARNER=RUN of your own learner, or a folder with an agent.py

@@ -18,8 +18,18 @@ from embodied.house.house import House
 from embodied.interface import Place, SuccessRule, Trajectory
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.navigation.free_space import ajar_doors
+from embodied.navigation.graph import AGENT_RADIUS
+from embodied.people.strolls import PERSON_RADIUS, Crowd, Stroll
 from embodied.tasks.goals import NOT_OBJECTS, footprint_distance
 
+PERSONAL, CONTACT, TIMELY = 1.0, AGENT_RADIUS + PERSON_RADIUS, 0.025
+"""Metres between the middles of a person and the body that are respectful, and at which they touch; metres an action of
+the fastest way, which STL compares with (Falcon, Gong et al. 2024)."""
+FOLLOWS, FACING, FOLLOWED = (1.0, 2.0), 0.5, 400 / 1500
+"""Metres from a person, cosine from straight ahead, and share of the steps of an episode that are following, as in
+Habitat 3 (Puig et al. 2023)."""
+PACE, SPIN = 1.0, 2.5
+"""Metres a second of a step, and radians a second of a turn: how long they take where people walk."""
 COLLIDED = 1e-3
 """A step that falls short by more than this, metres, is a collision."""
 PUSHED = 0.6
@@ -60,6 +70,8 @@ class Body:
     """Height of the camera above the floor, metres."""
     pitch: float = 0.0
     """Degrees that a level camera is mounted above the horizon."""
+    polite: bool = False
+    """People stand while the body is close before them; otherwise they do not see it."""
 
     def __post_init__(self) -> None:
         if not (0 < self.forward <= 1 and 0 < self.turn <= 90 and 360 % self.turn == 0 and self.steps >= 1):
@@ -138,6 +150,10 @@ class ContinuousEpisode:
     """ObjectNav: what is sought."""
     trajectory: str = ""
     """VLN-CE: the path's id, which several instructions share."""
+    people: tuple[Stroll, ...] = ()
+    """Who walks about meanwhile; touching somebody ends the episode."""
+    follows: bool = False
+    """The first of the people is to be followed until the time is up."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -153,6 +169,10 @@ class ContinuousTrajectory(Trajectory):
     """(n + 1,) degrees, integers."""
     actions: tuple[int, ...]
     collisions: int
+    people: np.ndarray
+    """(n + 1, people, 2) metres."""
+    contact: bool
+    """It ended by touching somebody."""
 
 
 class NavMeshCache:
@@ -193,6 +213,9 @@ class ContinuousEnv:
         self.position = self.ground.nearest_free(self.ground.plane(np.array(episode.start)))
         """(2,) metres, in the plane of `ground`."""
         self.yaw, self.tilt, self.collided, self.collisions, self.ended = episode.yaw, 0, False, 0, False
+        self.crowd, self.contact = Crowd(episode.people, polite=self.body.polite), False
+        """The people, and whether the body touched one."""
+        self._people = [self.crowd.places]
         self._actions: list[int] = []
         self._poses = [(*self.position, self.yaw, self.tilt)]
         self._distances = [self.ways.length_from(self.position)]
@@ -210,7 +233,7 @@ class ContinuousEnv:
             raise ValueError(f"an action should be a number from 0 to {self.body.actions - 1}, got {action!r}")
         if self.ended:
             raise RuntimeError("the episode is over; reset before another action")
-        self.collided = False
+        self.collided, before = False, self.position
         if action == HabitatAction.FORWARD:
             there = self.after(self.yaw)
             short = self.body.forward - float(np.linalg.norm(there - self.position))
@@ -223,11 +246,16 @@ class ContinuousEnv:
         elif action in (HabitatAction.UP, HabitatAction.DOWN):
             change = self.body.tilt * (1 if action == HabitatAction.UP else -1)
             self.tilt = max(-STEEPEST, min(STEEPEST, self.tilt + change))
+        if self.episode.people and action != HabitatAction.STOP:
+            steps = action == HabitatAction.FORWARD
+            seconds = self.body.forward / PACE if steps else math.radians(self.body.turn) / SPIN
+            self.contact = self.crowd.go_on(seconds, before, self.position) < CONTACT
+        self._people.append(self.crowd.places)
         self._actions.append(int(action))
         self._poses.append((*self.position, self.yaw, self.tilt))
         moved = action == HabitatAction.FORWARD
         self._distances.append(self.ways.length_from(self.position) if moved else self._distances[-1])
-        self.ended = action == HabitatAction.STOP or len(self._actions) >= self.body.steps
+        self.ended = action == HabitatAction.STOP or self.contact or len(self._actions) >= self.body.steps
 
     def after(self, yaw: float) -> np.ndarray:
         """(2,) where a step along `yaw` would end."""
@@ -256,6 +284,11 @@ class ContinuousEnv:
         return math.radians(max(-89.0, min(89.0, self.tilt + self.body.pitch)))
 
     @property
+    def is_following(self) -> bool:
+        """True where it faces the first of the people from the right distance."""
+        return bool(follows(self.position[None], np.array([self.yaw]), self.crowd.places[:1, :2])[0])
+
+    @property
     def steps(self) -> int:
         """Actions taken."""
         return len(self._actions)
@@ -266,6 +299,7 @@ class ContinuousEnv:
         positions = self.ground.world(poses[:, :2])
         metres = np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))
         way: dict[str, Any] = {"positions": positions, "yaws": poses[:, 2], "pitches": poses[:, 3].astype(int)}
+        way |= {"people": np.array(self._people)[..., :2], "contact": self.contact}
         return ContinuousTrajectory(
             rule=SuccessRule(self.episode.radius, strict=True),
             distances=np.array(self._distances[first:]),
@@ -274,6 +308,29 @@ class ContinuousEnv:
             stopped=self._actions[-1:] == [HabitatAction.STOP],
             **{**way, "actions": tuple(self._actions), "collisions": self.collisions, "episode": self.episode},
         )
+
+
+def follows(positions: np.ndarray, yaws: np.ndarray, person: np.ndarray) -> np.ndarray:
+    """(n,) bool: whether a body at (n, 2+) faces a person at (n, 2) from a distance in FOLLOWS."""
+    to = person - positions[:, :2]
+    metres, ahead = np.hypot(*to.T), to[:, 0] * np.cos(yaws) + to[:, 1] * np.sin(yaws)
+    return (metres >= FOLLOWS[0]) & (metres <= FOLLOWS[1]) & (ahead > FACING * metres)
+
+
+def social_measures(t: ContinuousTrajectory, steps: int) -> dict[str, float]:
+    """Measures of an episode among people: those of Falcon's evaluator or, where somebody is followed, of Habitat 3's,
+    whose distances are along the floor and not straight. Then success is to follow for a share FOLLOWED of `steps`."""
+    metres = np.linalg.norm(t.people[1:] - t.positions[1:, None, :2], axis=2)
+    measures = {"human_collision": float(t.contact), "psc": float((metres >= PERSONAL).all(1).mean())}
+    if not t.episode.follows:
+        least = t.shortest / TIMELY
+        return measures | {"stl": t.success * least / max(least, len(t.actions))}
+    near = follows(t.positions[1:], t.yaws[1:], t.people[1:, 0])
+    first = int(np.argmax(near)) if near.any() else len(near)
+    measures |= {"found": float(near.any()), "steps_to_find": float(first + 1 if near.any() else steps)}
+    once = near[first:].sum() / max(len(near) - first, 1)
+    measures |= {"following": near.sum() / steps, "following_after_found": once}
+    return measures | {"distance": metres[:, 0].mean(), "success": float(near.sum() >= FOLLOWED * steps), "spl": 0.0}
 
 
 POSITION = ("ahead", "left", "sin", "cos", "tilt")

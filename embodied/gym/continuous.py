@@ -11,6 +11,7 @@ camera. Episodes are the tasks of a `vln` data set, or objects of the houses of 
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -34,11 +35,12 @@ from embodied.envs.continuous import (
     ShortestPathFollower,
     check_on_floor,
     odometry,
+    social_measures,
 )
 from embodied.geometry import wrap
 from embodied.gym.drive import VIEW, LiveEnv, data_worlds, flat_worlds
 from embodied.gym.registration import register_environment
-from embodied.gym.sensors import LARGE, check_live, live_pixels, pixel_spaces
+from embodied.gym.sensors import LARGE, among, check_live, live_pixels, pixel_spaces
 from embodied.gym.spaces import codes_of, whole
 from embodied.gym.vector_env import in_step
 from embodied.kinds.metrics import warping
@@ -52,6 +54,8 @@ LONGEST_INSTRUCTION = 1000
 """Most characters of an instruction; longer ones are cut."""
 STEP_COST, PER_METRE = 0.01, 0.1
 """Of every action, and what a metre nearer to the goal is worth."""
+CONTACT_COST, FOLLOWING = 1.0, 0.05
+"""Of touching a person, and what an action of following is worth."""
 KEPT = 4
 """Houses whose renderers are held open, the last used."""
 LIVE_CHANNELS = ("rgb", "depth")
@@ -78,13 +82,15 @@ class ContinuousTask:
     """The file's, or 'module:NAME' of one's own, so that it is found."""
     title: str
     """Gymnasium has it as embodied/TITLE-v0."""
-    read: Callable[[Path], list[ContinuousEpisode]]
-    """The episodes of a file in Habitat's format."""
+    read: Callable[[Path], list[ContinuousEpisode]] | None
+    """The episodes of a file in Habitat's format; None where there is none."""
     episodes: Callable[[EpisodeSource], list[ContinuousEpisode]]
     body: Body = Body()
     camera: CameraConfig = CameraConfig()
     gps: bool = False
     """Observations have gps and compass."""
+    point: bool = False
+    """Observations have the goal: metres as the crow flies, and radians, left positive."""
 
 
 CONTINUOUS_TASKS: dict[str, ContinuousTask] = {}
@@ -181,14 +187,17 @@ class ContinuousGymEnv(LiveEnv):
         return self.look(), self._facts() | {"episode": episode.id, "instruction": episode.instruction}
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        before = self.play.distance
-        self.play.step(whole(action))
+        play, before = self.play, self.play.distance
+        play.step(whole(action))
         stopped, info = action == HabitatAction.STOP, self._facts()
-        if self.play.ended:
-            info |= judged(self.play.trajectory())
+        if play.ended:
+            info |= judged(play.trajectory())
+            if play.episode.people:
+                info |= social_measures(play.trajectory(), self.dataset.body.steps)
             info["is_success"] = info["success"] > 0
-        reward = float(info["is_success"]) - STEP_COST + PER_METRE * (before - self.play.distance)
-        return self.look(), reward, bool(stopped), self.play.ended and not stopped, info
+        gain = FOLLOWING * play.is_following if play.episode.follows else PER_METRE * (before - play.distance)
+        reward, ended = float(info["is_success"]) - STEP_COST - CONTACT_COST * play.contact, stopped or play.contact
+        return self.look(), reward + gain, bool(ended), play.ended and not ended, info
 
     def look(self) -> dict[str, Any]:
         """The observation."""
@@ -197,13 +206,18 @@ class ContinuousGymEnv(LiveEnv):
         if self.dataset.task.gps:
             turned = float(wrap(self.play.yaw - self.play.episode.yaw))
             observation["gps"], observation["compass"] = self.odometry()[:2], np.array([turned], np.float32)
+        if self.dataset.task.point:
+            x, y = np.subtract(self.play.episode.goals[0].position[:2], self.play.position)
+            aside = float(wrap(math.atan2(y, x) - self.play.yaw))
+            observation["goal"] = np.array([math.hypot(x, y), aside], np.float32)
         return observation
 
     def pixels(self) -> dict[str, np.ndarray]:
         """rgb (h, w, 3) uint8 and depth (h, w) float32, metres along the optical axis."""
         camera, world = self.dataset.camera, self._seen()
         pose = camera_at(self.play.eye, self.play.yaw, self.play.pitch, camera.vfov)
-        return live_pixels(world, pose, (camera.height, camera.width), self.dataset.observations)
+        size = camera.height, camera.width
+        return live_pixels(world, pose, size, self.dataset.observations, self.play.crowd.places)
 
     def odometry(self) -> np.ndarray:
         """(5,) float32 of embodied.envs.continuous.POSITION."""
@@ -219,8 +233,9 @@ class ContinuousGymEnv(LiveEnv):
         return self._seen().renderer.rgb(pose, VIEW)
 
     def _seen(self) -> World:
-        """The house with the doors that were pushed."""
-        return self.dataset.world(self.play.episode.world).with_doors(dict.fromkeys(self.play.pushed, 1.0))
+        """The house with the doors that were pushed, and the people."""
+        world = self.dataset.world(self.play.episode.world).with_doors(dict.fromkeys(self.play.pushed, 1.0))
+        return among(world, self.play.crowd)
 
     def close(self) -> None:
         for world in self.dataset.opened.values():
@@ -238,6 +253,8 @@ def observation_space(dataset: EpisodeDataset) -> spaces.Dict:
         **pixel_spaces((dataset.camera.height, dataset.camera.width), dataset.observations)
     }
     whole["instruction"] = spaces.Box(0, 255, (LONGEST_INSTRUCTION,), np.uint8)
+    if dataset.task.point:
+        whole["goal"] = spaces.Box(np.array([0, -4], np.float32), np.array([LARGE, 4], np.float32))
     if dataset.task.gps:
         whole["gps"] = spaces.Box(-LARGE, LARGE, (2,), np.float32)
         whole["compass"] = spaces.Box(-4.0, 4.0, (1,), np.float32)
@@ -300,6 +317,8 @@ def open_episodes(
         worlds = data_worlds(Path(data), split, where, pictures) if data else flat_worlds(seed, where, pictures)
     if episodes is None:
         played = task.episodes(EpisodeSource(worlds, whole, split, seed, where, navmeshes))
+    elif task.read is None:
+        raise ValueError(f"{task.title}-v0 reads no files of episodes; leave episodes={str(episodes)!r} out")
     else:
         played = task.read(Path(episodes))
         for e in (e for e in played if e.world in worlds):

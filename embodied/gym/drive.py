@@ -87,7 +87,7 @@ class DriveEnv(LiveEnv):
         reward, facts = self.driving.step(action)
         ended = self.driving.ended
         info: dict[str, Any] = {**facts, "is_success": facts["success"] > 0}
-        return self.driving.look(), reward, ended in ("reached", "said"), ended == "limit", info
+        return self.driving.look(), reward, ended not in (None, "limit"), ended == "limit", info
 
     def _picture(self) -> np.ndarray:
         return self.driving.seen.renderer.rgb(self.driving.camera(), VIEW)

@@ -15,15 +15,17 @@ import numpy as np
 from gymnasium import spaces
 
 from embodied.assistants.descriptions import word_number
+from embodied.envs.continuous import CONTACT, PERSONAL
 from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver
 from embodied.geometry import wrap
-from embodied.gym.sensors import LARGE, PIXELS, check_live, live_pixels
+from embodied.gym.sensors import LARGE, PIXELS, among, check_live, live_pixels
 from embodied.gym.spaces import codes_of
 from embodied.interface import SuccessRule, Trajectory
 from embodied.kinds.plugins import record_named
 from embodied.language.plain_language import with_article
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.navigation.free_space import EYE
+from embodied.people.strolls import Crowd, draw_strolls
 from embodied.render.camera import Camera, camera_at
 from embodied.scene.doors import openness
 from embodied.tasks.goals import NOT_OBJECTS, footprint_distance
@@ -69,6 +71,8 @@ class DriveSettings:
     """A point is reached within this many metres."""
     found: float = 1.0
     """An object is found within this many metres of its outline, in its room."""
+    people: int = 0
+    """Most people who walk about, at least one unless it is 0; touching somebody ends an episode."""
 
     def __post_init__(self) -> None:
         driven_task(self.task)
@@ -173,9 +177,11 @@ class Driving:
         self.metres = self.seconds = 0.0
         self._distances, self._lengths = [self.task.distance(self)], [0.0]
         self.collisions: list[str] = []
-        self.touched = False
+        self.touched, self.respectful, people = False, list[bool](), self.settings.people
+        count = int(rng.integers(1, people + 1)) if people else 0
+        self.crowd = Crowd(draw_strolls(self.world.house, self._ground, count, (x, y), rng=rng))
         self.ended: str | None = None
-        """'reached', 'said' or 'limit'; None while it goes on."""
+        """'reached', 'said', 'contact' or 'limit'; None while it goes on."""
         self._wide: DrivingWays | None = None
 
     def step(self, action: Sequence[float] | np.ndarray) -> tuple[float, dict[str, float]]:
@@ -196,6 +202,7 @@ class Driving:
             raise RuntimeError(f"the episode is over ({self.ended}); reset before another step")
         command = np.clip(command, -1.0, 1.0)
         periods = max(1, round(self.settings.control / CONTROL))
+        here = self.driver.position
         rolled = self.driver.roll(FASTEST * command[0], TURNING * command[1], periods)
         self.metres += rolled.metres
         self.seconds += periods * CONTROL
@@ -204,15 +211,20 @@ class Driving:
         before, self._left = self._left, self.left
         self._distances.append(self.task.distance(self))
         self._lengths.append(self.metres)
-        there = self.is_there
-        if command[2] > SAID if self.task.says else there:
+        came, there = self.crowd.go_on(periods * CONTROL, here, self.driver.position), self.is_there
+        self.respectful.append(came >= PERSONAL)
+        if contact := came < CONTACT:
+            self.ended = "contact"
+        elif command[2] > SAID if self.task.says else there:
             self.ended = "said" if self.task.says else "reached"
         elif self.seconds >= self.settings.seconds - 1e-9:
             self.ended = "limit"
-        trajectory, price = self.trajectory(), STEP_COST + COLLISION_COST * len(rolled.collisions)
+        trajectory, price = self.trajectory(), STEP_COST + COLLISION_COST * len(rolled.collisions) + contact
         reward = trajectory.success - price + PER_METRE * (before - self._left)
         facts = {"success": trajectory.success, "spl": trajectory.spl}
         facts |= {"collisions": float(len(self.collisions)), "metres": self.metres, "seconds": self.seconds}
+        if self.settings.people:
+            facts |= {"human_collision": float(contact), "psc": float(np.mean(self.respectful))}
         return reward, {**facts, "distance_to_goal": self._left}
 
     def trajectory(self) -> Trajectory:
@@ -245,14 +257,15 @@ class Driving:
         """The observation: pixels, motion, touch and goal."""
         s = self.settings
         motion, touched = np.array(self.driver.motion, np.float32), np.array([self.touched], np.float32)
-        pixels = live_pixels(self.seen, self.camera(), (s.height, s.width), s.observations)
+        pixels = live_pixels(self.seen, self.camera(), (s.height, s.width), s.observations, self.crowd.places)
         return {**pixels, "motion": motion, "touched": touched, **self.task.observation(self)}
 
     @property
     def seen(self) -> World:
-        """The house with the doors that were pushed, to a tenth."""
+        """The house with the doors that were pushed, to a tenth, and the people."""
         driver = self.driver
-        return self.world.with_doors({d: round(x, 1) for d, x in openness(driver.model, driver.data).items()})
+        ways = {d: round(x, 1) for d, x in openness(driver.model, driver.data).items()}
+        return among(self.world.with_doors(ways), self.crowd)
 
     def camera(self) -> Camera:
         """The body's eye as it is now, upright."""

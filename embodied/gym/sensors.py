@@ -7,6 +7,7 @@ visible objects.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import importlib.metadata
 import math
@@ -21,10 +22,11 @@ from gymnasium import spaces
 from embodied.errors import UnableError
 from embodied.interface import STEP, VIEWS, FeatureSource, Observation, Sight, Viewpoint, viewpoint
 from embodied.navigation.doors import place_named
+from embodied.people.strolls import PERSON_HEIGHT, PERSON_RADIUS, Crowd
 from embodied.render.camera import Camera
 from embodied.render.panorama import VFOV36, Panorama, equirect_grid, grid36, perspective_grid
 from embodied.render.photograph import PhotoCamera, check_camera
-from embodied.world import World
+from embodied.world import SLACK, World
 
 OBSERVATIONS = ("rgb", "depth", "ids", "features", "oracle")
 """Names of observations: three kinds of pixels, an encoder's features, an oracle's list of visible objects."""
@@ -65,12 +67,15 @@ def pixel_spaces(shape: tuple[int, ...], observations: Sequence[str]) -> dict[st
     return {name: kinds[name] for name in observations}
 
 
-def live_pixels(world: World, camera: Camera, size: tuple[int, int], observations: Sequence[str]) -> Arrays:
+def live_pixels(
+    world: World, camera: Camera, size: tuple[int, int], observations: Sequence[str], people: np.ndarray | None = None
+) -> Arrays:
     """Pictures of a camera, drawn now: depth in metres along the optical axis.
 
     Args:
       size: height and width, pixels.
       observations: some of PIXELS; of nothing, nothing is drawn.
+      people: (n, 2+) places of people of the ground floor, who stand in the depth of unlit houses as cylinders.
     """
     if not observations:
         return {}
@@ -82,8 +87,34 @@ def live_pixels(world: World, camera: Camera, size: tuple[int, int], observation
         whole["rgb"], depth, whole["ids"] = view.rgb, view.depth, view.ids
     else:
         depth, whole["ids"] = world.renderer.depth_and_ids(camera, size)
+    if people is not None and world.pictures.quality is None:
+        depth = with_people(depth, camera, people, world.house.storeys[0].elevation)
     whole["depth"] = np.minimum(depth, np.float32(FAR))
     return {name: np.ascontiguousarray(whole[name]) for name in observations}
+
+
+def among(world: World, crowd: Crowd) -> World:
+    """The world, in which, where it is lit, people are drawn where they are now."""
+    if world.pictures.quality is not None and (len(crowd.clocks) or world.moment.people):
+        world.show(dataclasses.replace(world.moment, people=crowd.figures), slack=3 * SLACK)
+    return world
+
+
+def with_people(depth: np.ndarray, camera: Camera, places: np.ndarray, floor: float) -> np.ndarray:
+    """A depth picture (h, w), metres along the optical axis, in which people at (n, 2+) metres stand as cylinders."""
+    h, w = depth.shape
+    tall, depth = math.tan(camera.vfov / 2) / h, depth.copy()
+    across, up = np.meshgrid(tall * (2 * np.arange(w) + 1 - w), tall * (h - 1 - 2 * np.arange(h)))
+    rays = camera.forward + across[..., None] * camera.right + up[..., None] * np.array(camera.up)
+    square, eye = (rays[..., :2] ** 2).sum(-1), np.array(camera.position)
+    for to in places[:, :2] - eye[:2]:
+        middle = rays[..., :2] @ to
+        chord = middle**2 - square * (to @ to - PERSON_RADIUS**2)
+        near = (middle - np.sqrt(np.maximum(chord, 0.0))) / square
+        height = eye[2] + near * rays[..., 2] - floor
+        hit = (chord > 0) & (near > 0) & (height > 0) & (height < PERSON_HEIGHT)
+        depth[hit] = np.minimum(depth, near)[hit]
+    return depth
 
 
 def check_live(observations: Sequence[str], known: Sequence[str], height: int, width: int) -> None:

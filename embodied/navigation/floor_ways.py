@@ -70,9 +70,9 @@ class FloorWays:
         self.room_of_cell = np.concatenate(names)
         """(n,) ids of rooms; empty in a doorway and on stairs."""
         parts = [translate(g.space, n * APART) for n, (g, _) in enumerate(spaces)]
-        self._space = shapely.union_all(parts) if len(parts) > 1 else parts[0]
-        self._inside = self._space.buffer(-INSIDE)
-        for shape in (self._space, self._inside):
+        self.space = shapely.union_all(parts) if len(parts) > 1 else parts[0]
+        self._inside = self.space.buffer(-INSIDE)
+        for shape in (self.space, self._inside):
             shapely.prepare(shape)
         self._tree = cKDTree(self.xy)
         a, b, costs = (np.concatenate(x) for x in zip(*matrices, *self._crossings()))
@@ -175,7 +175,7 @@ class FloorWays:
             moved = there[:, :2] + (np.asarray(a) - here[:2])
             b = np.where((np.abs(self.world(moved)[:, 2] - there[:, 2]) < 0.3)[:, None], moved, b)
         lines = np.stack([np.broadcast_to(a, np.shape(b)), b], axis=1)
-        return np.asarray(shapely.covers(self._space, shapely.linestrings(lines)))
+        return np.asarray(shapely.covers(self.space, shapely.linestrings(lines)))
 
 
 @dataclass(frozen=True, eq=False)

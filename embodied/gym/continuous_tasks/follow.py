@@ -1,0 +1,19 @@
+"""FollowNav: find a person who walks to and fro, and follow at 1 to 2 m (Habitat 3, Puig et al. 2023)."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from embodied.envs.continuous import ContinuousEpisode, NavigationGoal
+from embodied.gym.continuous import ContinuousTask, EpisodeSource, register_continuous
+from embodied.gym.continuous_tasks.social import social_source
+
+
+def follow_source(source: EpisodeSource) -> list[ContinuousEpisode]:
+    """The episodes of SocialNav, in which the first of the people is followed."""
+    words = "find the person and stay 1 to 2 m away, facing them"
+    first = lambda e: {"goals": (NavigationGoal(e.people[0].way[0]),), "people": e.people[:1]}
+    return [dataclasses.replace(e, instruction=words, follows=True, **first(e)) for e in social_source(source)]
+
+
+FOLLOWNAV = register_continuous(ContinuousTask("follow", "FollowNav", None, follow_source, gps=True))

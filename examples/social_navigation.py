@@ -1,0 +1,422 @@
+"""Social navigation and following a person: baselines, and PPO of Stable-Baselines3 that learns from depth.
+
+    pip install stable-baselines3 && python examples/social_navigation.py --minutes 20 --out out/social
+
+The agents play `embodied/SocialNav-v0` and `FollowNav-v0` in --unseen flats; PPO learns in --flats others, which nobody
+draws: its camera is ROWS x COLUMNS rays among the collision boxes of the house, and people are cylinders. It sees three
+such pictures, the last one first, and the goal; it moves ahead or turns, and stops where the goal is nearer than
+0.27 m. It first imitates the shortest way for --imitate actions, then learns by PPO for --minutes of processor time
+(reward: embodied.gym.continuous, and WRONG_TOUCH for touching a person). --blind learns with black pictures.
+
+OUT/agent.zip holds the weights, OUT/result.json a table as docs/results/data has it (--weights: judge these agents).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import mujoco
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import DummyVecEnv
+
+from embodied.assets.cache import default_cache
+from embodied.assets.catalogue import load_catalogue
+from embodied.datasets.build import make_dataset_house
+from embodied.envs.continuous import (
+    CONTACT,
+    FOLLOWS,
+    PACE,
+    ContinuousEnv,
+    HabitatAction,
+    ShortestPathFollower,
+    goal_cells,
+)
+from embodied.evaluation.tables import Samples, interval
+from embodied.generate import HouseConfig
+from embodied.gym.continuous import ContinuousGymEnv, EpisodeDataset, open_episodes
+from embodied.gym.sensors import with_people
+from embodied.records import identity_of
+from embodied.render.camera import camera_at
+from embodied.scene.model import build_spec
+from embodied.world import World, open_world
+
+AREA = (50.0, 75.0)
+"""Size of the flats, square metres."""
+ROWS, COLUMNS, TALL, EYE, FAR = 3, 32, math.radians(18.0), 1.0, 8.0
+"""Of the camera: rays, radians of its height, metres above the floor, and metres beyond which all looks the same."""
+SEEN = 3
+"""Pictures that are seen at once."""
+ACTIONS = (HabitatAction.FORWARD, HabitatAction.LEFT, HabitatAction.RIGHT)
+Agent = Callable[[], int]
+LOOK_AHEAD, MARGIN, TIME = 8, 0.1, 2.5
+"""Cells of a way that an agent goes towards; metres kept free besides; seconds without touch that ORCA plans for."""
+WAITS, SEES = 1.5, 5.0
+"""Metres from which who waits for people does so, and ORCA counts them in."""
+TURNING, AGAINST = 0.05, 100.0
+"""Metres a second that a turn counts when velocities are compared, and of a metre a second against ORCA."""
+
+
+class WaitAndGo:
+    """The shortest way, but standing while somebody is close before the body: turning to and fro."""
+
+    def __init__(self, env: ContinuousEnv) -> None:
+        self.env, self._expert = env, ShortestPathFollower(env)
+
+    def action(self) -> int:
+        env, wanted = self.env, self._expert.action()
+        to = env.crowd.places[:, :2] - env.position
+        ahead = to @ (math.cos(env.yaw), math.sin(env.yaw))
+        waits = wanted == HabitatAction.FORWARD and ((np.hypot(*to.T) < WAITS) & (ahead > 0)).any()
+        return turned_to_and_fro(env) if waits else wanted
+
+
+class Orca:
+    """Goes to the goal, or after the first of the people, by the velocity nearest to the wanted one that touches nobody
+    for TIME seconds, of those that the body can have: standing, or a step along each of its headings.
+
+    Optimal reciprocal collision avoidance (van den Berg et al. 2011), whose half-planes take all of the change upon
+    the agent, since people do not avoid it.
+    """
+
+    def __init__(self, env: ContinuousEnv, *, knows: bool = True) -> None:
+        """
+        Args:
+          knows: it knows where people are now; otherwise only where they were at first.
+        """
+        self.env, self._knows, self._was = env, knows, env.position
+        self._people, self._clocks = env.crowd.places, env.crowd.clocks
+        self._ways = env.ground.wide_ways(goal_cells(env.episode, env.ground))
+
+    def action(self) -> int:
+        env, here = self.env, self.env.position
+        people, clocks = (env.crowd.places, env.crowd.clocks) if self._knows else (self._people, self._clocks)
+        seconds = np.maximum(clocks - self._clocks, 1e-9)[:, None]
+        velocities = (people - self._people) / seconds
+        self._people, self._clocks = people, clocks
+        own, self._was = PACE * (here - self._was) / env.body.forward, here
+        if not (follows := env.episode.follows) and env.distance < 0.9 * env.episode.radius:
+            return HabitatAction.STOP
+        ways = env.ground.wide_ways(env.ground.cells_at(people[:1, :2])) if follows else self._ways
+        way = env.ground.xy[ways.cells(env.ground.cell_at(here))[: LOOK_AHEAD + 1]]
+        there = follows and math.dist(people[0, :2], here) < sum(FOLLOWS) / 2
+        to = (
+            people[0, :2] - here
+            if there
+            else way[int(env.ground.is_free(here, way).nonzero()[0].max(initial=0))] - here
+        )
+        wanted = PACE * to / max(float(np.linalg.norm(to)), 1e-9)
+        number = 360 // env.body.turn
+        turns = (np.arange(number) + number // 2) % number - number // 2
+        angles = env.yaw + turns * math.radians(env.body.turn)
+        units = np.stack([np.cos(angles), np.sin(angles)], 1)
+        moves = np.flatnonzero(env.ground.is_free(here, here + env.body.forward * units))
+        choices = np.vstack([PACE * units[moves], np.zeros((1, 2))])
+        cost = np.linalg.norm(choices - (0 if there else wanted), axis=1)
+        cost += TURNING * np.append(np.abs(turns[moves]), 0)
+        for p, v in zip(people[:, :2] - here, velocities):
+            if np.hypot(*p) < SEES:
+                change, normal = half_plane(p, own - v[:2], CONTACT + MARGIN, env.body.forward / PACE)
+                cost += AGAINST * np.maximum(-(choices - own - change) @ normal, 0.0)
+        best = int(np.argmin(cost))
+        stands = best == len(moves)
+        turn = turns[int(np.argmax(units @ wanted)) if stands else moves[best]]
+        if turn:
+            return HabitatAction.LEFT if turn > 0 else HabitatAction.RIGHT
+        return turned_to_and_fro(env) if stands else HabitatAction.FORWARD
+
+
+def half_plane(p: np.ndarray, v: np.ndarray, radius: float, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """(2,) the smallest change of velocity after which two discs do not touch for TIME seconds, and (2,) the direction
+    in which more is allowed, too.
+
+    Args:
+      p, v: (2,) from the one to the other, metres, and its velocity less the other's.
+      radius: the sum of both, metres.
+      step: seconds in which they have to part where they touch.
+    """
+    apart, time = float(np.hypot(*p)), TIME
+    if apart <= radius:
+        time = step
+    w = v - p / time
+    if apart <= radius or (w @ p < 0 and (w @ p) ** 2 > (radius * np.hypot(*w)) ** 2):  # on the round end of the cone
+        normal = w / max(float(np.hypot(*w)), 1e-9)
+        return (radius / time - float(np.hypot(*w))) * normal, normal
+    leg, side = math.sqrt(apart**2 - radius**2), 1.0 if p[0] * w[1] - p[1] * w[0] > 0 else -1.0
+    along = np.array([p[0] * leg - side * p[1] * radius, side * p[0] * radius + p[1] * leg]) / apart**2
+    return (v @ along) * along - v, side * np.array([-along[1], along[0]])
+
+
+def turned_to_and_fro(env: ContinuousEnv) -> int:
+    """Waiting, for a body that cannot."""
+    return HabitatAction.LEFT if env.steps % 2 else HabitatAction.RIGHT
+
+
+class Rays:
+    """Depth pictures of a few rays, for learning."""
+
+    def __init__(self, world: World) -> None:
+        self._model = build_spec(world.house, world.catalogue, parts=()).compile()
+        self._data = mujoco.MjData(self._model)
+        mujoco.mj_forward(self._model, self._data)
+
+    def depth(self, play: ContinuousEnv) -> np.ndarray:
+        """(ROWS, COLUMNS) float32 metres."""
+        camera = camera_at((*play.eye[:2], play.floor + EYE), play.yaw, 0.0, TALL)
+        tall = math.tan(TALL / 2) / ROWS
+        across, up = np.meshgrid(tall * (2 * np.arange(COLUMNS) + 1 - COLUMNS), tall * (ROWS - 1 - 2 * np.arange(ROWS)))
+        rays = camera.forward + across[..., None] * camera.right + up[..., None] * np.array(camera.up)
+        stretch, count = np.linalg.norm(rays, axis=-1), ROWS * COLUMNS
+        geoms, metres = np.empty(count, np.int32), np.empty(count)
+        eye, lines = np.array(camera.position), (rays / stretch[..., None]).ravel()
+        mujoco.mj_multiRay(
+            self._model, self._data, eye, lines, None, 1, -1, geoms, metres, None, count, mujoco.mjMAXVAL
+        )
+        depth = np.where(geoms < 0, FAR, metres).reshape(ROWS, COLUMNS) / stretch
+        return np.minimum(with_people(depth, camera, play.crowd.places, play.floor), FAR).astype(np.float32)
+
+
+class Seeing(gymnasium.Wrapper):
+    """What PPO sees and does."""
+
+    def __init__(self, env: ContinuousGymEnv, rays: dict[str, Rays], blind: bool) -> None:
+        super().__init__(env)
+        self._rays, self._blind, self._pictures = rays, blind, deque[np.ndarray](maxlen=SEEN)
+        size = SEEN * ROWS * COLUMNS + 3 + len(ACTIONS)
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
+        self.action_space = gymnasium.spaces.Discrete(len(ACTIONS))
+
+    def reset(self, **options: Any) -> tuple[np.ndarray, dict[str, Any]]:
+        observation, info = self.env.reset(**options)
+        self._pictures.clear()
+        return self.seen(observation), info
+
+    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        near = self._goal[0] < 0.9 * self.env.play.episode.radius
+        observation, *rest = self.env.step(HabitatAction.STOP if near else ACTIONS[int(action)])
+        return self.seen(observation, int(action)), *rest
+
+    def seen(self, observation: dict[str, Any], action: int = -1) -> np.ndarray:
+        """The pictures, the goal and the last action as one vector."""
+        play = self.env.play
+        if not self._blind:
+            world = self.env.dataset.worlds[play.episode.world]
+            if world.name not in self._rays:
+                self._rays[world.name] = Rays(world)
+            picture = 1 - self._rays[world.name].depth(play).ravel() / FAR
+        else:
+            picture = np.zeros(ROWS * COLUMNS, np.float32)
+        while len(self._pictures) < SEEN:
+            self._pictures.append(picture)
+        self._pictures.append(picture)
+        metres, aside = self._goal = observation["goal"]
+        goal = [min(metres / FAR, 1.0), math.sin(aside), math.cos(aside)]
+        last = np.arange(len(ACTIONS)) == action
+        return np.concatenate([*reversed(self._pictures), goal, last]).astype(np.float32)
+
+
+def flats(numbers: range, seed: int) -> dict[str, World]:
+    catalogue, worlds = load_catalogue(default_cache()), {}
+    for n in numbers:
+        house, graph = make_dataset_house(seed, f"flat_{n}", HouseConfig(area=AREA), catalogue)
+        worlds[house.name] = open_world(house, catalogue, default_cache(), "unlit", graph=graph)
+    return worlds
+
+
+def imitated(learner: PPO, envs: list[Seeing], actions: int, seed: int) -> None:
+    """Teaches the shortest way, and what it is worth, before PPO begins; every tenth action is drawn."""
+    rng, seen, done, worth = np.random.default_rng(seed), [], [], []
+    while len(seen) < actions:
+        env, rewards = envs[len(worth) % len(envs)], []
+        observation, _ = env.reset(seed=int(rng.integers(2**31)))
+        expert, ended = ShortestPathFollower(env.env.play), False
+        while not ended:
+            wanted = expert.action()
+            right = ACTIONS.index(wanted) if wanted in ACTIONS else 0
+            seen.append(observation)
+            done.append(right)
+            drawn = right if rng.random() > 0.1 else int(rng.integers(len(ACTIONS)))
+            observation, reward, terminated, truncated, _ = env.step(drawn)
+            rewards.append(reward)
+            ended = terminated or truncated
+        back = 0.0
+        values = [back := r + learner.gamma * back for r in reversed(rewards)][::-1]
+        worth += values
+    x, y, v = torch.tensor(np.array(seen)), torch.tensor(done), torch.tensor(worth, dtype=torch.float32)
+    optimizer = torch.optim.Adam(learner.policy.parameters(), 1e-3)
+    for k in range(2000):
+        rows = torch.from_numpy(rng.integers(len(x), size=512))
+        values, log_probability, _ = learner.policy.evaluate_actions(x[rows], y[rows])
+        loss = -log_probability.mean() + 0.5 * (values[:, 0] - v[rows]).square().mean()
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        if k % 500 == 499:
+            print(f"imitation, {len(x)} actions: loss {float(loss):.3f}", flush=True)
+
+
+class Until(BaseCallback):
+    """Prints how episodes ended, saves the agent, and stops when the time is over."""
+
+    def __init__(self, out: Path, minutes: float) -> None:
+        super().__init__()
+        self._out, self._end, self._ended, self._rollouts = out, time.process_time() + 60 * minutes, [], 0
+
+    def _on_step(self) -> bool:
+        self._ended += [info for info, done in zip(self.locals["infos"], self.locals["dones"]) if done]
+        return time.process_time() < self._end
+
+    def _on_rollout_end(self) -> None:
+        self._rollouts += 1
+        if self._rollouts % 10 == 0 and self._ended:
+            numbers = {k: float(np.mean([i[k] for i in self._ended])) for k in ("success", "human_collision", "psc")}
+            print(f"{self.num_timesteps} steps", *(f"{k} {v:.3f}" for k, v in numbers.items()), flush=True)
+            self._ended = []
+            self.model.save(self._out / "agent.zip")
+
+
+def train(args: argparse.Namespace) -> None:
+    worlds, rays = flats(range(args.flats), args.house_seed), dict[str, Rays]()
+    played = open_episodes("social", worlds=worlds, observations=())
+    print(f"{len(worlds)} flats, {len(played.episodes)} episodes", flush=True)
+    envs = [Seeing(ContinuousGymEnv(played), rays, args.blind) for _ in range(16)]
+    how = {"n_steps": 128, "batch_size": 512, "n_epochs": 4, "ent_coef": 0.01, "learning_rate": 2e-4, "seed": args.seed}
+    nets = {"net_arch": [256, 128]}
+    learner = PPO("MlpPolicy", DummyVecEnv([lambda e=e: e for e in envs]), policy_kwargs=nets, device="cpu", **how)
+    imitated(learner, envs, args.imitate, args.seed)
+    learner.learn(10**9, callback=Until(args.out, args.minutes))
+    learner.save(args.out / "agent.zip")
+
+
+def judged(played: EpisodeDataset, agent: Callable[[ContinuousGymEnv], Agent], each: int) -> dict[str, Samples]:
+    """Measures of the first episodes of each house."""
+    env, found, houses, count = ContinuousGymEnv(played), dict[str, list[float]](), list[str](), dict[str, int]()
+    for k, episode in enumerate(played.episodes):
+        count[episode.world] = count.get(episode.world, 0) + 1
+        if count[episode.world] > each:
+            continue
+        env.reset(seed=k, options={"episode": k})
+        act, ended = agent(env), False
+        while not ended:
+            _, _, terminated, truncated, info = env.step(act())
+            ended = terminated or truncated
+        houses.append(episode.world)
+        for name in set(SHOWN) & set(info):
+            found.setdefault(name, []).append(float(info[name]))
+    return {name: Samples(tuple(x), tuple(houses), share=name in SHARES) for name, x in found.items()}
+
+
+def learned(weights: Path, rays: dict[str, Rays], blind: bool) -> Callable[[ContinuousGymEnv], Agent]:
+    """The likeliest action of trained weights."""
+    policy = PPO.load(weights, device="cpu").policy
+
+    def agent(env: ContinuousGymEnv) -> Agent:
+        eyes, last = Seeing(env, rays, blind), -1
+
+        def act() -> int:
+            nonlocal last
+            seen = eyes.seen(env.look(), last)
+            last = int(policy.predict(seen, deterministic=True)[0])
+            return HabitatAction.STOP if eyes._goal[0] < 0.9 * env.play.episode.radius else ACTIONS[last]
+
+        return act
+
+    return agent
+
+
+def at_random(env: ContinuousGymEnv) -> Agent:
+    rng = np.random.default_rng(env.np_random.integers(2**31))
+    return lambda: int(rng.choice(ACTIONS))
+
+
+SHOWN = {
+    "success": "success", "spl": "SPL", "stl": "STL", "psc": "personal space", "human_collision": "human collision",
+    "found": "found", "steps_to_find": "steps to find", "following": "following",
+    "following_after_found": "following, once found", "distance": "metres apart", "steps_taken": "steps",
+}  # fmt: skip
+"""Titles of measures."""
+NUMBERS, SHARES = ("steps_to_find", "distance", "steps_taken"), ("success", "human_collision", "found")
+BASELINES = {
+    "random": at_random,
+    "shortest path, ignores people": lambda env: ShortestPathFollower(env.play).action,
+    "wait and go": lambda env: WaitAndGo(env.play).action,
+    "ORCA": lambda env: Orca(env.play).action,
+}
+FOLLOWERS = {
+    "random": at_random,
+    "goes where the person was at first": lambda env: Orca(env.play, knows=False).action,
+    "knows where the person is": lambda env: Orca(env.play).action,
+}
+
+
+def judge(args: argparse.Namespace) -> None:
+    """Writes the tables."""
+    worlds, rays = flats(range(1000, 1000 + args.unseen), args.house_seed), dict[str, Rays]()
+    agents = dict(BASELINES)
+    for path in args.weights:
+        agents[f"PPO, {path.stem}"] = learned(path, rays, "blind" in path.stem)
+    for kind, rows, title in (
+        ("social", agents, "Going to a point among people"),
+        ("follow", FOLLOWERS, "Following a person"),
+    ):
+        played = open_episodes(kind, worlds=worlds, observations=(), split="test", polite=args.polite)
+        table, keys = [], list[str]()
+        for label, agent in rows.items():
+            samples = judged(played, agent, args.judge)
+            keys = [k for k in SHOWN if k in samples and not (kind == "follow" and k == "spl")]
+            values = {}
+            for k in keys:
+                e, scale = interval([samples[k]]), 1.0 if k in NUMBERS else 100.0
+                values[k] = {"mean": round(scale * e.mean, 2), "half_width": round(scale * e.half, 2), "n": e.n}
+            table.append({"label": label, "values": values, "printed": {}})
+            print(kind, label, {k: v["mean"] for k, v in values.items()}, flush=True)
+        columns = [{"key": k, "title": SHOWN[k], "unit": "" if k in NUMBERS else "%"} for k in keys]
+        about = f"{args.judge} episodes in each of {args.unseen} flats of 50 to 75 m² that nobody learned in. "
+        about += (
+            "One to three people. 95 % intervals clustered by house."
+            if kind == "social"
+            else "One person. 95 % intervals clustered by house."
+        )
+        body = {"table": f"social-{kind}", "title": title, "paper": None, "command": args.command}
+        body |= {
+            "identity": {"judged": identity_of("embodied.envs.continuous", "embodied.gym.continuous_tasks.social")}
+        }
+        body |= {"settings": about, "notes": [], "columns": columns, "rows": table}
+        (args.out / f"social-{kind}.json").write_text(json.dumps(body, indent=1, ensure_ascii=False) + "\n")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, required=True, help="folder of weights and tables")
+    parser.add_argument("--minutes", type=float, default=20.0, help="of processor time, for PPO")
+    parser.add_argument("--flats", type=int, default=32, help="how many flats it learns in")
+    parser.add_argument("--unseen", type=int, default=12, help="in how many other flats agents are judged")
+    parser.add_argument("--imitate", type=int, default=30_000, help="actions of the shortest way to begin with")
+    parser.add_argument("--judge", type=int, default=20, help="episodes of each flat; 0 judges nothing")
+    parser.add_argument("--weights", type=Path, nargs="*", default=(), help="judge these agents, train none")
+    parser.add_argument("--blind", action="store_true", help="learn with black pictures")
+    parser.add_argument("--polite", action="store_true", help="people stand while the agent is close before them")
+    parser.add_argument("--house-seed", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0)
+    args = parser.parse_args()
+    args.command = "python examples/social_navigation.py"
+    torch.set_num_threads(1)
+    args.out.mkdir(parents=True, exist_ok=True)
+    if not args.weights:
+        train(args)
+    if args.judge:
+        judge(args)
+
+
+if __name__ == "__main__":
+    main()
