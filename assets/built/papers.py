@@ -4,43 +4,30 @@ from __future__ import annotations
 
 import numpy as np
 
+from embodied.assets.built import primitives
 from embodied.assets.built.parametric import CLOTHS, BuildRequest, FinishedShapes, parts_of, plain, whole_image
-from embodied.assets.built.primitives import (
-    Shape,
-    ball,
-    bar,
-    between,
-    box,
-    cylinder,
-    frame,
-    joined,
-    lathe,
-    quads,
-    rim,
-    sheet,
-    tube,
-    upright,
-)
 from embodied.assets.records import MeshPart
 
 PALE = 1.35
 """Sum of a cloth's channels from which on it is printed dark."""
 
 
-def _book(w: float, d: float, h: float, *, rng: np.random.Generator) -> tuple[Shape, Shape, Shape | None]:
+def _book(
+    w: float, d: float, h: float, *, rng: np.random.Generator
+) -> tuple[primitives.Shape, primitives.Shape, primitives.Shape | None]:
     """A standing book, spine to -y: cover, pages, a band on its spine."""
     c = 0.0022
-    cover = joined(
-        box([-w / 2, -d / 2, 0], [-w / 2 + c, d / 2, h], 0.0008),
-        box([w / 2 - c, -d / 2, 0], [w / 2, d / 2, h], 0.0008),
-        box([-w / 2 + c * 0.5, -d / 2, 0], [w / 2 - c * 0.5, -d / 2 + c, h], 0.0008),
+    cover = primitives.joined(
+        primitives.box([-w / 2, -d / 2, 0], [-w / 2 + c, d / 2, h], 0.0008),
+        primitives.box([w / 2 - c, -d / 2, 0], [w / 2, d / 2, h], 0.0008),
+        primitives.box([-w / 2 + c * 0.5, -d / 2, 0], [w / 2 - c * 0.5, -d / 2 + c, h], 0.0008),
     )
-    pages = box([-w / 2 + c, -d / 2 + c, 0.003], [w / 2 - c, d / 2 - 0.004, h - 0.003])
+    pages = primitives.box([-w / 2 + c, -d / 2 + c, 0.003], [w / 2 - c, d / 2 - 0.004, h - 0.003])
     band = None
     if rng.random() < 0.7:
         z = h * rng.uniform(0.55, 0.8)
         t = h * rng.uniform(0.03, 0.14)
-        band = box([-w / 2 + 0.001, -d / 2 - 0.0003, z], [w / 2 - 0.001, -d / 2 + 0.001, z + t])
+        band = primitives.box([-w / 2 + 0.001, -d / 2 - 0.0003, z], [w / 2 - 0.001, -d / 2 + 0.001, z + t])
     return cover, pages, band
 
 
@@ -51,17 +38,17 @@ def _words(low: float, high: float, count: int, *, rng: np.random.Generator) -> 
     return np.stack([starts, np.maximum(stops, starts + 0.003)], axis=1)
 
 
-def _on_spine(w: float, d: float, h: float, *, rng: np.random.Generator) -> Shape:
+def _on_spine(w: float, d: float, h: float, *, rng: np.random.Generator) -> primitives.Shape:
     """The title on the spine of a standing book: words that run upwards."""
     tall = min(0.32 * w, rng.uniform(0.004, 0.009))
     low = rng.uniform(0.12, 0.3) * h
     z = _words(low, low + rng.uniform(0.2, 0.38) * h, int(rng.integers(1, 4)), rng=rng)
     y, x = np.full_like(z[:, 0], -d / 2 - 0.0006), np.full_like(z[:, 0], tall / 2)
     corners = [(-x, y, z[:, 0]), (x, y, z[:, 0]), (x, y, z[:, 1]), (-x, y, z[:, 1])]
-    return quads(np.stack([np.stack(c, axis=1) for c in corners], axis=1))
+    return primitives.quads(np.stack([np.stack(c, axis=1) for c in corners], axis=1))
 
 
-def _on_front(w: float, d: float, h: float, *, rng: np.random.Generator) -> Shape:
+def _on_front(w: float, d: float, h: float, *, rng: np.random.Generator) -> primitives.Shape:
     """Title, rule and author on the front (-x) of a standing book whose spine looks to -y."""
     lines = []
     top, tall = h * rng.uniform(0.78, 0.88), h * rng.uniform(0.035, 0.06)
@@ -70,7 +57,7 @@ def _on_front(w: float, d: float, h: float, *, rng: np.random.Generator) -> Shap
         words = _words(-reach, reach, 1 if k == 2 else int(rng.integers(1, 4)), rng=rng)
         lines += [(y0, y1, top - 1.7 * k * tall, top - 1.7 * k * tall + high) for y0, y1 in words]
     x = -w / 2 - 0.0006
-    return quads([[(x, y1, z0), (x, y0, z0), (x, y0, z1), (x, y1, z1)] for y0, y1, z0, z1 in lines])
+    return primitives.quads([[(x, y1, z0), (x, y0, z0), (x, y0, z1), (x, y1, z1)] for y0, y1, z0, z1 in lines])
 
 
 def _ink(cloth: int) -> str:
@@ -81,8 +68,8 @@ def _ink(cloth: int) -> str:
 def book_row(spec: BuildRequest) -> list[MeshPart]:
     """Books side by side, of many heights and colours; the last ones may lean."""
     (w, d, h), rng = spec.size, spec.rng
-    by_color: dict[int, list[Shape]] = {}
-    titles: dict[str, list[Shape]] = {"gilt": [], "ink": []}
+    by_color: dict[int, list[primitives.Shape]] = {}
+    titles: dict[str, list[primitives.Shape]] = {"gilt": [], "ink": []}
     pages, bands = [], []
     (prints,) = rng.spawn(1)
     x = -w / 2
@@ -127,7 +114,7 @@ def book_stack(spec: BuildRequest) -> list[MeshPart]:
         cover, leaves, _ = _book(*inner, rng=rng)
         print_ = _on_spine(*inner, rng=prints)
         if k == count - 1:
-            print_ = joined(print_, _on_front(*inner, rng=prints))
+            print_ = primitives.joined(print_, _on_front(*inner, rng=prints))
         angle = 0.0 if count == 1 else rng.normal(0, 0.12)
         place = [
             s.turned(np.pi / 2, "y").moved(-w * 0.47 * shrink, 0, t / 2).turned(angle).moved(0, 0, z)
@@ -146,9 +133,9 @@ def magazine(spec: BuildRequest) -> list[MeshPart]:
     x, y = np.meshgrid(np.linspace(-w / 2, w / 2, 9), np.linspace(-d / 2, d / 2, 5))
     grid = np.stack([x, y, h * (0.55 + 0.45 * ((x + w / 2) / w) ** 2)], -1)
     cover = spec.material("cover", "magazine_cover/0")
-    top = whole_image(sheet(grid), cover, -w / 2, w / 2, -d / 2, d / 2, "xy", keep_aspect=False)
-    edge = between(rim(grid) * [1, 1, 0], rim(grid))
-    base = quads([[(-w / 2, d / 2, 0), (w / 2, d / 2, 0), (w / 2, -d / 2, 0), (-w / 2, -d / 2, 0)]])
+    top = whole_image(primitives.sheet(grid), cover, -w / 2, w / 2, -d / 2, d / 2, "xy", keep_aspect=False)
+    edge = primitives.between(primitives.rim(grid) * [1, 1, 0], primitives.rim(grid))
+    base = primitives.quads([[(-w / 2, d / 2, 0), (w / 2, d / 2, 0), (w / 2, -d / 2, 0), (-w / 2, -d / 2, 0)]])
     return parts_of((cover, top), ("paper", [edge, base]))
 
 
@@ -157,7 +144,7 @@ def papers(spec: BuildRequest) -> list[MeshPart]:
     (w, d, h), rng = spec.size, spec.rng
     leaves = []
     for k, z in enumerate(np.linspace(0, h * 0.92, 6)):
-        leaf = box([-w * 0.46, -d * 0.46, 0], [w * 0.46, d * 0.46, h * 0.16])
+        leaf = primitives.box([-w * 0.46, -d * 0.46, 0], [w * 0.46, d * 0.46, h * 0.16])
         leaf = leaf.turned(rng.normal(0, 0.05) if k else 0.0)
         leaves.append(leaf.moved(rng.normal(0, 0.004), rng.normal(0, 0.004), z))
     return parts_of(("paper", leaves))
@@ -167,14 +154,14 @@ def photo_frame(spec: BuildRequest) -> list[MeshPart]:
     """A small standing frame with a photograph."""
     w, _, h = spec.size
     f, tilt = 0.016, 0.22
-    boards = frame(-w / 2, w / 2, 0, h, (0, 0.012), f, 0.002)
+    boards = primitives.frame(-w / 2, w / 2, 0, h, (0, 0.012), f, 0.002)
     art = spec.material("art", "art_sea/0")
     inside = -w / 2 + f, w / 2 - f, f, h - f
-    image = whole_image(upright(*inside, 0.004), art, *inside)
-    back = box([-w / 2 + 0.004, 0.010, 0.004], [w / 2 - 0.004, 0.013, h - 0.004])
-    leg = bar([0, h * 0.13 + 0.012, h * 0.6], [0, h * 0.34, 0.002], 0.035, 0.003)
+    image = whole_image(primitives.upright(*inside, 0.004), art, *inside)
+    back = primitives.box([-w / 2 + 0.004, 0.010, 0.004], [w / 2 - 0.004, 0.013, h - 0.004])
+    leg = primitives.bar([0, h * 0.13 + 0.012, h * 0.6], [0, h * 0.34, 0.002], 0.035, 0.003)
     wood = {"brass": "brass", "black": "black", "white": "porcelain"}.get(spec.word("frame", "oak"), "oak/0")
-    lean = [s.turned(-tilt, "x") for s in (joined(*boards), image, back)]
+    lean = [s.turned(-tilt, "x") for s in (primitives.joined(*boards), image, back)]
     return parts_of((spec.named(wood), lean[0]), (art, lean[1]), ("black", [lean[2], leg]))
 
 
@@ -186,27 +173,29 @@ def alarm_clock(spec: BuildRequest) -> list[MeshPart]:
     back = [(0, 0), (r * 0.86, 0), (r * 0.97, d * 0.12), (r, d * 0.3)]
     case = [*back, (r, d * 0.62), (r * 0.94, d * 0.7), (r * 0.9, d * 0.62)]
     around = [(r * 0.90, d * 0.62), (r * 0.90, d * 0.73), (r * 0.96, d * 0.75), (r * 1.0, d * 0.7), (r * 1.0, d * 0.62)]
-    shell, ring = (lathe(profile, 36, 0.9).hung(0, d * 0.4, zc) for profile in (case, around[::-1]))
+    shell, ring = (primitives.lathe(profile, 36, 0.9).hung(0, d * 0.4, zc) for profile in (case, around[::-1]))
     face = spec.finish("clock_face/0")
-    disc = cylinder(r * 0.9, 0, 0.001, 0, 36).hung(0, d * 0.4 - d * 0.66, zc)
+    disc = primitives.cylinder(r * 0.9, 0, 0.001, 0, 36).hung(0, d * 0.4 - d * 0.66, zc)
     disc = whole_image(disc, face, -r * 0.9, r * 0.9, zc - r * 0.9, zc + r * 0.9)
     t = np.linspace(0, np.pi / 2, 6)
-    cap = lathe([(0, -0.002), (r * 0.36, -0.002), *np.stack([r * 0.38 * np.cos(t), r * 0.30 * np.sin(t)], 1)], 20, 0.9)
+    cap = primitives.lathe(
+        [(0, -0.002), (r * 0.36, -0.002), *np.stack([r * 0.38 * np.cos(t), r * 0.30 * np.sin(t)], 1)], 20, 0.9
+    )
     nail = [(0, -r * 0.3), (r * 0.05, -r * 0.3), (r * 0.05, r * 0.36), (r * 0.09, r * 0.38), (0, r * 0.42)]
-    pin = lathe(nail, 8, 0.9)
+    pin = primitives.lathe(nail, 8, 0.9)
     bells = [
         s.turned(side * 0.55, "y").moved(side * r * 0.56, 0, zc + r * 0.98) for side in (-1, 1) for s in (cap, pin)
     ]
     hammer = [
-        tube([(0, 0, zc + r * 0.9), (0, 0, zc + r * 1.16)], 0.0016, 6),
-        ball(0.0045, 8, 6).moved(0, 0, zc + r * 1.18),
+        primitives.tube([(0, 0, zc + r * 0.9), (0, 0, zc + r * 1.16)], 0.0016, 6),
+        primitives.ball(0.0045, 8, 6).moved(0, 0, zc + r * 1.18),
     ]
     a = np.linspace(0.25, np.pi - 0.25, 12)
-    bow = tube(np.stack([r * 0.6 * np.cos(a), 0 * a, zc + r * 1.02 + r * 0.42 * np.sin(a)], 1), 0.0016, 6)
+    bow = primitives.tube(np.stack([r * 0.6 * np.cos(a), 0 * a, zc + r * 1.02 + r * 0.42 * np.sin(a)], 1), 0.0016, 6)
     feet = [
-        joined(
-            tube([(s * r * 0.5, 0, zc - r * 0.75), (s * r * 0.78, 0, 0.005)], [0.003, 0.004], 7),
-            ball(0.0055, 8, 6).moved(s * r * 0.78, 0, 0.0055),
+        primitives.joined(
+            primitives.tube([(s * r * 0.5, 0, zc - r * 0.75), (s * r * 0.78, 0, 0.005)], [0.003, 0.004], 7),
+            primitives.ball(0.0055, 8, 6).moved(s * r * 0.78, 0, 0.0055),
         )
         for s in (-1, 1)
     ]
@@ -217,13 +206,13 @@ def alarm_clock(spec: BuildRequest) -> list[MeshPart]:
 
 def remote(spec: BuildRequest) -> list[MeshPart]:
     w, d, h = spec.size
-    body = box([-w / 2, -d / 2, 0], [w / 2, d / 2, h * 0.88], h * 0.25)
+    body = primitives.box([-w / 2, -d / 2, 0], [w / 2, d / 2, h * 0.88], h * 0.25)
     keys = [
-        box([x - 0.004, y - 0.003, h * 0.85], [x + 0.004, y + 0.003, h], 0.0008)
+        primitives.box([x - 0.004, y - 0.003, h * 0.85], [x + 0.004, y + 0.003, h], 0.0008)
         for x in np.linspace(-0.3, 0.3, 3) * w
         for y in np.linspace(-0.34, 0.28, 7) * d
     ]
-    power = box([-0.32 * w, 0.38 * d, h * 0.85], [-0.18 * w, 0.42 * d, h], 0.0008)
+    power = primitives.box([-0.32 * w, 0.38 * d, h * 0.85], [-0.18 * w, 0.42 * d, h], 0.0008)
     return parts_of(
         (plain((0.06, 0.06, 0.065), 0.45), body),
         (plain((0.35, 0.35, 0.36), 0.6), keys),
@@ -235,16 +224,16 @@ def keys(spec: BuildRequest) -> list[MeshPart]:
     """A ring with three keys fanned out and a leather tag."""
     _, d, h = spec.size
     around = [(0.016 * np.cos(t), 0.016 * np.sin(t), 0) for t in np.linspace(0, 6.283, 19)[:-1]]
-    ring = tube(around, 0.0011, 6, closed=True).moved(0, d * 0.3, h * 0.5)
+    ring = primitives.tube(around, 0.0011, 6, closed=True).moved(0, d * 0.3, h * 0.5)
     made = []
     for k, a in enumerate((-2.1, -1.5, -1.0)):
-        bow = lathe([(0.004, 0), (0.011, 0), (0.011, 0.002), (0.004, 0.002), (0.004, 0)], 16).moved(0.013)
-        blade = joined(
-            box([0.022, -0.0035, 0], [0.052, 0.0035, 0.002]),
-            *[box([x, -0.0055, 0], [x + 0.003, -0.003, 0.002]) for x in (0.036, 0.042, 0.047)],
+        bow = primitives.lathe([(0.004, 0), (0.011, 0), (0.011, 0.002), (0.004, 0.002), (0.004, 0)], 16).moved(0.013)
+        blade = primitives.joined(
+            primitives.box([0.022, -0.0035, 0], [0.052, 0.0035, 0.002]),
+            *[primitives.box([x, -0.0055, 0], [x + 0.003, -0.003, 0.002]) for x in (0.036, 0.042, 0.047)],
         )
-        made.append(joined(bow, blade).turned(a).moved(0, d * 0.3, 0.001 + 0.0022 * k))
-    tag = box([0.014, -0.010, 0], [0.060, 0.010, 0.003], 0.001).turned(0.3).moved(0, d * 0.3, 0.001)
+        made.append(primitives.joined(bow, blade).turned(a).moved(0, d * 0.3, 0.001 + 0.0022 * k))
+    tag = primitives.box([0.014, -0.010, 0], [0.060, 0.010, 0.003], 0.001).turned(0.3).moved(0, d * 0.3, 0.001)
     return parts_of(("steel", [ring, made[0], made[2]]), ("brass", made[1]), (plain((0.36, 0.22, 0.13), 0.6), tag))
 
 
@@ -253,10 +242,12 @@ def tissue_box(spec: BuildRequest) -> list[MeshPart]:
     top = h * 0.62
     x, y = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9))
     rise = (1 - np.maximum(np.abs(x), np.abs(y)) ** 2) * (0.75 + 0.25 * np.sin(4 * x + 3 * y)) * (h - top)
-    tissue = sheet(np.stack([x * 0.05 + 0.01 * np.sin(5 * y), y * 0.022, top - 0.004 + np.clip(rise, 0, None)], -1))
-    slot = lathe([(0.0, 0.0), (1.0, 0.0), (1.0, 0.0008), (0.0, 0.0008)], 24)
+    tissue = primitives.sheet(
+        np.stack([x * 0.05 + 0.01 * np.sin(5 * y), y * 0.022, top - 0.004 + np.clip(rise, 0, None)], -1)
+    )
+    slot = primitives.lathe([(0.0, 0.0), (1.0, 0.0), (1.0, 0.0008), (0.0, 0.0008)], 24)
     return parts_of(
-        (spec.material("skin", "cotton/3"), box([-w / 2, -d / 2, 0], [w / 2, d / 2, top], 0.003)),
+        (spec.material("skin", "cotton/3"), primitives.box([-w / 2, -d / 2, 0], [w / 2, d / 2, top], 0.003)),
         ("black", slot.scaled(w * 0.32, d * 0.2, 1).moved(0, 0, top - 0.0004)),
         (plain((0.95, 0.95, 0.95), 0.95, specular=0.05), tissue.two_sided()),
     )
@@ -271,8 +262,10 @@ def pencil_cup(spec: BuildRequest) -> list[MeshPart]:
         a = k * 2.4 + rng.uniform(0, 0.6)
         tip = np.array([0.85 * r * np.cos(a), 0.85 * r * np.sin(a), h * rng.uniform(0.82, 1.0)])
         foot = np.array([-0.5 * r * np.cos(a), -0.5 * r * np.sin(a), 0.006])
-        pens.append((plain(tints[k % 5], 0.4), tube([foot, tip], 0.0037, 6)))
-        pens.append((plain((0.82, 0.68, 0.48), 0.7), tube([tip, tip + (tip - foot) * 0.07], [0.0037, 0.0006], 6)))
+        pens.append((plain(tints[k % 5], 0.4), primitives.tube([foot, tip], 0.0037, 6)))
+        pens.append(
+            (plain((0.82, 0.68, 0.48), 0.7), primitives.tube([tip, tip + (tip - foot) * 0.07], [0.0037, 0.0006], 6))
+        )
     skin = spec.material("skin", "leather/2") if "skin" in spec.params else plain((0.10, 0.10, 0.105), 0.5)
     wall = [(0, 0), (r * 0.98, 0), (r, high), (r - 0.003, high), (r * 0.98 - 0.003, 0.004), (0, 0.004)]
-    return parts_of((skin, lathe(wall, 24)), *pens)
+    return parts_of((skin, primitives.lathe(wall, 24)), *pens)

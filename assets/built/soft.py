@@ -4,20 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from embodied.assets.built import primitives
 from embodied.assets.built.parametric import BuildRequest, parts_of, plain, whole_image
-from embodied.assets.built.primitives import (
-    Shape,
-    ball,
-    box,
-    cylinder,
-    folds,
-    joined,
-    lathe,
-    pillow,
-    quads,
-    sheet,
-    tube,
-)
 from embodied.assets.records import MeshPart, Size
 
 PLEAT = 0.095
@@ -31,7 +19,7 @@ def rug(spec: BuildRequest) -> list[MeshPart]:
     pattern = spec.finish(name)
     fringe = 0.045 if spec.params.get("fringe") else 0.0
     w0 = w / 2 - fringe
-    body = box([-w0, -d / 2, 0], [w0, d / 2, h], min(0.004, h * 0.4))
+    body = primitives.box([-w0, -d / 2, 0], [w0, d / 2, h], min(0.004, h * 0.4))
     if name.startswith("rug_"):
         body = whole_image(body, pattern, -w0, w0, -d / 2, d / 2, "xy", keep_aspect=False)
     tassels = []
@@ -48,8 +36,11 @@ def rug(spec: BuildRequest) -> list[MeshPart]:
                 (a, y + 0.004, 0.004),
             )
             c = np.stack([np.stack([u, v, np.full_like(y, up)], 1) for u, v, up in corners], 1)
-            tassels.append(quads(c if side > 0 else c[:, ::-1]))
-        tassels += [box([-w / 2, -0.004, 0], [-w0, 0.004, 0.003]), box([w0, -0.004, 0], [w / 2, 0.004, 0.003])]
+            tassels.append(primitives.quads(c if side > 0 else c[:, ::-1]))
+        tassels += [
+            primitives.box([-w / 2, -0.004, 0], [-w0, 0.004, 0.003]),
+            primitives.box([w0, -0.004, 0], [w / 2, 0.004, 0.003]),
+        ]
     return parts_of((pattern, body), (plain((0.80, 0.75, 0.64), 0.95, specular=0.05), tassels))
 
 
@@ -57,7 +48,7 @@ def round_rug(spec: BuildRequest) -> list[MeshPart]:
     """A round (or oval) rug."""
     w, d, h = spec.size
     pattern = spec.material("pattern", "rug_rings/0")
-    disc = lathe([(0, 0), (0.49, 0), (0.5, h * 0.4), (0.495, h * 0.85), (0.485, h), (0, h)], 56, 0.8)
+    disc = primitives.lathe([(0, 0), (0.49, 0), (0.5, h * 0.4), (0.495, h * 0.85), (0.485, h), (0, h)], 56, 0.8)
     disc = disc.scaled(w, d, 1.0)
     return parts_of((pattern, whole_image(disc, pattern, -w / 2, w / 2, -d / 2, d / 2, "xy", keep_aspect=False)))
 
@@ -70,22 +61,24 @@ def curtain(spec: BuildRequest) -> list[MeshPart]:
     panel = w * float(spec.params.get("drawn", 0.30)) * 0.5 + 0.10
     parts, hooks = [], []
     around = [(0, 0.019 * np.cos(t), 0.019 * np.sin(t)) for t in np.linspace(0, 2 * np.pi, 12, endpoint=False)]
-    ring = tube(around, 0.0022, 5, closed=True)
+    ring = primitives.tube(around, 0.0022, 5, closed=True)
     for side in (-1, 1):
         width = panel * rng.uniform(0.94, 1.06)
         count = max(4, round(width / PLEAT))
-        grid = folds(width, rod_z - 0.035, count, min(d * 0.36, 0.06), rng=rng, columns=count * 9, rows=7, gather=0.1)
-        cloth_sheet = sheet(grid, 0.0025)
+        grid = primitives.folds(
+            width, rod_z - 0.035, count, min(d * 0.36, 0.06), rng=rng, columns=count * 9, rows=7, gather=0.1
+        )
+        cloth_sheet = primitives.sheet(grid, 0.0025)
         # Cloth is gathered: the pattern runs on over the folds, as measured along the sheet.
         parts.append(cloth_sheet.moved(side * (w / 2 - 0.05 - width / 2), -0.01, 0.0))
         for x in np.linspace(-0.46, 0.46, max(4, count // 2)) * width:
             hooks.append(ring.moved(side * (w / 2 - 0.05 - width / 2) + x, -0.01, rod_z - 0.008))
-    rod = tube([(-w / 2 + 0.03, -0.01, rod_z), (w / 2 - 0.03, -0.01, rod_z)], 0.011, 10)
-    ends = [ball(0.022, 12, 8).scaled(1.4, 1, 1).moved(s * (w / 2 - 0.031), -0.01, rod_z) for s in (-1, 1)]
+    rod = primitives.tube([(-w / 2 + 0.03, -0.01, rod_z), (w / 2 - 0.03, -0.01, rod_z)], 0.011, 10)
+    ends = [primitives.ball(0.022, 12, 8).scaled(1.4, 1, 1).moved(s * (w / 2 - 0.031), -0.01, rod_z) for s in (-1, 1)]
     brackets = [
-        joined(
-            box([x - 0.008, -0.01, rod_z - 0.008], [x + 0.008, d / 2, rod_z + 0.008], 0.002),
-            box([x - 0.02, d / 2 - 0.006, rod_z - 0.03], [x + 0.02, d / 2, rod_z + 0.03], 0.002),
+        primitives.joined(
+            primitives.box([x - 0.008, -0.01, rod_z - 0.008], [x + 0.008, d / 2, rod_z + 0.008], 0.002),
+            primitives.box([x - 0.02, d / 2 - 0.006, rod_z - 0.03], [x + 0.02, d / 2, rod_z + 0.03], 0.002),
         )
         for x in (-w / 2 + 0.09, w / 2 - 0.09)
     ]
@@ -95,21 +88,21 @@ def curtain(spec: BuildRequest) -> list[MeshPart]:
 def sheer(spec: BuildRequest) -> list[MeshPart]:
     """One light curtain over the whole window."""
     w, d, h = spec.size
-    grid = folds(w * 0.97, h - 0.03, max(6, round(w / 0.09)), min(d * 0.35, 0.035), rng=spec.rng, rows=5)
-    rail = box([-w / 2, -0.012, h - 0.03], [w / 2, 0.02, h], 0.002)
-    return parts_of((plain((0.93, 0.93, 0.92), 0.9, specular=0.05), sheet(grid, 0.001)), ("white", rail))
+    grid = primitives.folds(w * 0.97, h - 0.03, max(6, round(w / 0.09)), min(d * 0.35, 0.035), rng=spec.rng, rows=5)
+    rail = primitives.box([-w / 2, -0.012, h - 0.03], [w / 2, 0.02, h], 0.002)
+    return parts_of((plain((0.93, 0.93, 0.92), 0.9, specular=0.05), primitives.sheet(grid, 0.001)), ("white", rail))
 
 
 def roller_blind(spec: BuildRequest) -> list[MeshPart]:
     """Cloth from a roll, a bar at its foot, a bead chain."""
     w, d, h = spec.size
     r = min(d / 2, 0.028)
-    roll = cylinder(r * 0.85, -w / 2 + 0.02, w / 2 - 0.02, 0, 16).turned(np.pi / 2, "y").moved(0, 0, h - r)
-    cloth = box([-w / 2 + 0.025, -0.001, 0.014], [w / 2 - 0.025, 0.001, h - r])
-    foot = box([-w / 2 + 0.022, -0.006, 0], [w / 2 - 0.022, 0.006, 0.022], 0.003)
+    roll = primitives.cylinder(r * 0.85, -w / 2 + 0.02, w / 2 - 0.02, 0, 16).turned(np.pi / 2, "y").moved(0, 0, h - r)
+    cloth = primitives.box([-w / 2 + 0.025, -0.001, 0.014], [w / 2 - 0.025, 0.001, h - r])
+    foot = primitives.box([-w / 2 + 0.022, -0.006, 0], [w / 2 - 0.022, 0.006, 0.022], 0.003)
     spans = ((-w / 2, -w / 2 + 0.02), (w / 2 - 0.02, w / 2))
-    ends = [box([a, -d / 2, h - 2 * r], [b, d / 2, h], 0.003) for a, b in spans]
-    chain = tube([(w / 2 - 0.01, -d / 2 + 0.006, h - r), (w / 2 - 0.01, -d / 2 + 0.006, h * 0.35)], 0.002, 5)
+    ends = [primitives.box([a, -d / 2, h - 2 * r], [b, d / 2, h], 0.003) for a, b in spans]
+    chain = primitives.tube([(w / 2 - 0.01, -d / 2 + 0.006, h - r), (w / 2 - 0.01, -d / 2 + 0.006, h * 0.35)], 0.002, 5)
     return parts_of((spec.material("cloth", "screen/0"), [roll, cloth]), ("white", [foot, *ends, chain]))
 
 
@@ -124,7 +117,9 @@ def cushion(spec: BuildRequest) -> list[MeshPart]:
         waves += 0.045 * h * np.sin(k * (x * np.cos(a) + y * np.sin(a)) * 2 + rng.uniform(0, 6))
     waves -= 0.10 * h * np.exp(-((x - rng.normal(0, 0.2)) ** 2 + (y - rng.normal(0, 0.2)) ** 2) * 3)
     cloth = spec.material("cloth", "linen/7")
-    return parts_of((cloth, pillow(w, d, h, cells, 0.36, waves).shifted_uv(*rng.random(2)).moved(0, 0, h / 2)))
+    return parts_of(
+        (cloth, primitives.pillow(w, d, h, cells, 0.36, waves).shifted_uv(*rng.random(2)).moved(0, 0, h / 2))
+    )
 
 
 def throw(spec: BuildRequest) -> list[MeshPart]:
@@ -134,7 +129,7 @@ def throw(spec: BuildRequest) -> list[MeshPart]:
     )
 
 
-def layers(size: Size, count: int, *, rng: np.random.Generator) -> list[Shape]:
+def layers(size: Size, count: int, *, rng: np.random.Generator) -> list[primitives.Shape]:
     """`count` folded cloths on one another, each of four layers, the fold in front."""
     w, d, h = size
     t = h / count
@@ -147,7 +142,7 @@ def layers(size: Size, count: int, *, rng: np.random.Generator) -> list[Shape]:
     return made
 
 
-def _folded_leaf(w: float, d: float, t: float, outer: bool, *, rng: np.random.Generator) -> Shape:
+def _folded_leaf(w: float, d: float, t: float, outer: bool, *, rng: np.random.Generator) -> primitives.Shape:
     """Cloth folded once around a bend in front, `t` thick as the outer of two such leaves, or the inner of them."""
     thick = t * 0.235
     bend = t * (0.375 if outer else 0.125)
@@ -170,7 +165,7 @@ def _folded_leaf(w: float, d: float, t: float, outer: bool, *, rng: np.random.Ge
     along_x, along_y = 2.5 * share[:, None] + rng.uniform(0, 6), 9 * core[None, :, 0] / d + rng.uniform(0, 6)
     sag = 0.05 * t * np.sin(along_x) * np.sin(along_y)
     x = share[:, None] * w / 2 + 0.004 * np.sin(14 * core[None, :, 0] / d + rng.uniform(0, 6)) * np.abs(share[:, None])
-    leaf = sheet(np.stack(np.broadcast_arrays(x, section[..., 0], section[..., 1] + t / 2 + sag), -1))
+    leaf = primitives.sheet(np.stack(np.broadcast_arrays(x, section[..., 0], section[..., 1] + t / 2 + sag), -1))
     a, b, c = (leaf.vertices - np.mean(leaf.vertices, axis=0))[leaf.faces.T]
     volume = np.einsum("ij,ij->", a, np.cross(b, c))
     return leaf if volume > 0 else leaf.reversed()

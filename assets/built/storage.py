@@ -6,23 +6,14 @@ import itertools
 
 import numpy as np
 
-from embodied.assets.built.parametric import (
-    BuildRequest,
-    ParamValues,
-    carcass,
-    front,
-    handle,
-    joints,
-    parts_of,
-    surface,
-)
+from embodied.assets.built import parametric
 from embodied.assets.built.primitives import bar, box, pillow
 from embodied.assets.records import MeshPart, Size, SupportSurface
 
 BOARD = 0.022
 
 
-def shelf(spec: BuildRequest) -> list[MeshPart]:
+def shelf(spec: parametric.BuildRequest) -> list[MeshPart]:
     """A board on two brackets."""
     w, d, h = spec.size
     plank = box([-w / 2, -d / 2, h - 0.028], [w / 2, d / 2, h], 0.003)
@@ -33,7 +24,7 @@ def shelf(spec: BuildRequest) -> list[MeshPart]:
             box([x - 0.012, -d * 0.3, h - 0.034], [x + 0.012, d / 2, h - 0.028]),
             bar([x, d / 2 - 0.004, 0.02], [x, -d * 0.25, h - 0.034], 0.010, 0.008),
         ]
-    return parts_of((spec.material("wood", "oak/0"), plank), (spec.metal("black"), irons))
+    return parametric.parts_of((spec.material("wood", "oak/0"), plank), (spec.metal("black"), irons))
 
 
 def _levels(h: float, count: int) -> np.ndarray:
@@ -41,7 +32,7 @@ def _levels(h: float, count: int) -> np.ndarray:
     return np.linspace(0.06, h - BOARD, count + 1)
 
 
-def bookcase(spec: BuildRequest) -> list[MeshPart]:
+def bookcase(spec: parametric.BuildRequest) -> list[MeshPart]:
     """Sides, boards, a plinth and a thin back."""
     w, d, h = spec.size
     z = _levels(h, int(spec.params.get("shelves", 5)))
@@ -52,27 +43,27 @@ def bookcase(spec: BuildRequest) -> list[MeshPart]:
     boards = [box([-w / 2 + BOARD, -d / 2 + 0.002, a], [w / 2 - BOARD, d / 2 - 0.006, a + BOARD], 0.0015) for a in z]
     back = box([-w / 2 + BOARD, d / 2 - 0.006, 0.06], [w / 2 - BOARD, d / 2, h])
     plinth = box([-w / 2 + BOARD, -d / 2 + 0.02, 0], [w / 2 - BOARD, -d / 2 + 0.038, 0.06])
-    return parts_of((spec.material("wood", "oak/0"), [*sides, *boards, plinth, back]))
+    return parametric.parts_of((spec.material("wood", "oak/0"), [*sides, *boards, plinth, back]))
 
 
-def shelf_surfaces(size: Size, params: ParamValues) -> tuple[SupportSurface, ...]:
+def shelf_surfaces(size: Size, params: parametric.ParamValues) -> tuple[SupportSurface, ...]:
     """Support surfaces of `bookcase`, from below, and its top."""
     w, d, h = size
     z = _levels(h, int(params.get("shelves", 5)))
     inner = [
-        surface(f"shelf_{k + 1}", float(a + BOARD), w - 2 * BOARD, d - 0.008, float(b - a - BOARD), 0.008)
+        parametric.surface(f"shelf_{k + 1}", float(a + BOARD), w - 2 * BOARD, d - 0.008, float(b - a - BOARD), 0.008)
         for k, (a, b) in enumerate(itertools.pairwise(z))
     ]
-    return (*inner, surface("top", h, w, d, 9.0 if h < 1.9 else 0.5))
+    return (*inner, parametric.surface("top", h, w, d, 9.0 if h < 1.9 else 0.5))
 
 
-def top_surface(size: Size, params: ParamValues) -> tuple[SupportSurface, ...]:
+def top_surface(size: Size, params: parametric.ParamValues) -> tuple[SupportSurface, ...]:
     """The top of something tall and flat."""
     w, d, h = size
-    return (surface("top", h, w, d, 9.0 if h < 1.9 else 0.5),)
+    return (parametric.surface("top", h, w, d, 9.0 if h < 1.9 else 0.5),)
 
 
-def wardrobe(spec: BuildRequest) -> list[MeshPart]:
+def wardrobe(spec: parametric.BuildRequest) -> list[MeshPart]:
     """Hinged doors over a plinth, with long handles; one leaf a mirror where params['mirror'] is 1."""
     w, d, h = spec.size
     y, low = -d / 2 + 0.002, 0.07
@@ -81,23 +72,27 @@ def wardrobe(spec: BuildRequest) -> list[MeshPart]:
     style = spec.word("style", "flat")
     doors, grips, glass = [], [], []
     for k, (a, b) in enumerate(itertools.pairwise(edges)):
-        doors.append(front(a, b, low, h - 0.02, y, style))
-        grips.append(handle(b - 0.035 if k % 2 == 0 else a + 0.035, h * 0.5, y, spec.word("handle", "bar"), True, 0.22))
+        doors.append(parametric.front(a, b, low, h - 0.02, y, style))
+        grips.append(
+            parametric.handle(
+                b - 0.035 if k % 2 == 0 else a + 0.035, h * 0.5, y, spec.word("handle", "bar"), True, 0.22
+            )
+        )
         if spec.params.get("mirror") and k == leaves // 2:
             glass.append(box([a + 0.02, y - 0.004, low + 0.03], [b - 0.02, y + 0.001, h - 0.05], 0.001))
-    body = carcass((-w / 2, y + 0.02, low), (w / 2, d / 2, h))
+    body = parametric.carcass((-w / 2, y + 0.02, low), (w / 2, d / 2, h))
     plinth = box([-w / 2 + 0.01, -d / 2 + 0.05, 0], [w / 2 - 0.01, d / 2 - 0.02, low])
     top = box([-w / 2, -d / 2, h - 0.018], [w / 2, d / 2, h], 0.002)
-    return parts_of(
+    return parametric.parts_of(
         (spec.material("front", "lacquer_white/0"), [*doors, body, top]),
         ("black", plinth),
-        joints(doors),
+        parametric.joints(doors),
         (spec.metal("steel"), grips),
         ("mirror", glass),
     )
 
 
-def bedside(spec: BuildRequest) -> list[MeshPart]:
+def bedside(spec: parametric.BuildRequest) -> list[MeshPart]:
     """A bedside table on feet: two drawers, or one over an open shelf where params["drawers"] is 1."""
     w, d, h = spec.size
     open_below = spec.params.get("drawers") == 1
@@ -122,28 +117,28 @@ def bedside(spec: BuildRequest) -> list[MeshPart]:
     ]
     rows = [(split, high)] if open_below else [(low, split), (split, high)]
     edge = x - board - 0.001
-    drawers = [front(-edge, edge, a + 0.001, b - 0.001, y, "flat", 0.018) for a, b in rows]
+    drawers = [parametric.front(-edge, edge, a + 0.001, b - 0.001, y, "flat", 0.018) for a, b in rows]
     grip = "knob" if open_below else "bar"
-    grips = [handle(0, (a + b) / 2 + (0 if open_below else 0.03), y, grip, False, 0.16) for a, b in rows]
+    grips = [parametric.handle(0, (a + b) / 2 + (0 if open_below else 0.03), y, grip, False, 0.16) for a, b in rows]
     wood = spec.material("wood", "oak/0")
-    return parts_of(
+    return parametric.parts_of(
         (wood, [*body, *feet]),
         (spec.material("front", "oak/0") if "front" in spec.params else wood, drawers),
-        joints(drawers),
+        parametric.joints(drawers),
         (spec.metal("steel"), grips),
     )
 
 
-def storage_box(spec: BuildRequest) -> list[MeshPart]:
+def storage_box(spec: parametric.BuildRequest) -> list[MeshPart]:
     """A box with a lid and a label holder."""
     w, d, h = spec.size
     body = box([-w / 2 + 0.004, -d / 2 + 0.004, 0], [w / 2 - 0.004, d / 2 - 0.004, h * 0.85], 0.004)
     lid = box([-w / 2, -d / 2, h * 0.72], [w / 2, d / 2, h], 0.005)
     label = box([-0.035, -d / 2 + 0.002, h * 0.36], [0.035, -d / 2 + 0.005, h * 0.52], 0.001)
-    return parts_of((spec.material("skin", "linen/2"), [body, lid]), ("steel", label))
+    return parametric.parts_of((spec.material("skin", "linen/2"), [body, lid]), ("steel", label))
 
 
-def bean_bag(spec: BuildRequest) -> list[MeshPart]:
+def bean_bag(spec: parametric.BuildRequest) -> list[MeshPart]:
     """A floor cushion, thick and round."""
     w, d, h = spec.size
-    return parts_of((spec.material("cloth", "linen/9"), pillow(w, d, h, 16, 0.28).moved(0, 0, h / 2)))
+    return parametric.parts_of((spec.material("cloth", "linen/9"), pillow(w, d, h, 16, 0.28).moved(0, 0, h / 2)))

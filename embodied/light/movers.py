@@ -181,17 +181,12 @@ def surface_of(
     )
     if not len(corners):
         return plain
-    face = np.concatenate([t.face + first for t, first in zip(lux.texels, _firsts(atlas.pages), strict=True)])
+    counts = [0 if p.glass else len(p.corners) for p in atlas.pages]
+    firsts = np.where([p.glass for p in atlas.pages], 10**9, np.cumsum(counts) - counts).tolist()  # far away for glass
+    face = np.concatenate([t.face + first for t, first in zip(lux.texels, firsts, strict=True)])
     transfer, open_ = _transfer(plain, lux.face_normal, face)
     discs = discs_of(lux.position, lux.face_normal, lux.thin, lux.area * open_)
     return dataclasses.replace(plain, transfer=transfer, discs=discs)
-
-
-def _firsts(pages: Sequence) -> list[int]:
-    """Number of the first triangle of each page among the opaque ones of all; far away for glass."""
-    counts = [0 if p.glass else len(p.corners) for p in pages]
-    starts = np.cumsum(counts) - counts
-    return [10**9 if p.glass else int(s) for p, s in zip(pages, starts, strict=True)]
 
 
 def unhidden(normal: np.ndarray, thin: np.ndarray) -> np.ndarray:

@@ -368,10 +368,11 @@ class MovingHouse:
         cut = lambda known: [a if a is None else a[source] for a, source in zip(known, kept)]
         surfaces = self.surfaces
         own = [(s, m, g) for s in surfaces for m, g in zip(s.meshes, s.gloss, strict=True)]
+        middles = ((s.pages[m.page].albedo, m.uv[m.faces].mean(1), g[:, 2].any()) for s, m, g in own)
         return dataclasses.replace(
             still,
             gloss=[*cut(still.gloss), *(g[:, :3] for _, _, g in own)],
-            tint=[*cut(still.tint), *(_tint(s, m, g) for s, m, g in own)],
+            tint=[*cut(still.tint), *(texels_at(albedo, at) if metal else None for albedo, at, metal in middles)],
             glow=[*still.glow, *(None for s in surfaces for _ in s.pages)],
             detail=[*cut(still.detail), *(np.zeros(len(g), np.uint8) for _, _, g in own)],
         )
@@ -425,13 +426,6 @@ def _in_frame(p: Part, frame: RigidPose) -> Part:
     """A part of the house placed in the frame of an upright pose."""
     x, y, z = (np.subtract(p.position, frame.position) @ frame.rotation).tolist()
     return dataclasses.replace(p, position=(x, y, z), yaw=p.yaw - frame.yaw)
-
-
-def _tint(s: Surface, m: LitMesh, gloss: np.ndarray) -> np.ndarray | None:
-    """(m, 3) float32 colour of the middle of each face; None where none is of metal."""
-    if not gloss[:, 2].any():
-        return None
-    return texels_at(s.pages[m.page].albedo, m.uv[m.faces].mean(1))
 
 
 def _nothing(m: LitMesh) -> LitMesh:

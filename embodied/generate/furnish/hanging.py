@@ -8,20 +8,9 @@ from __future__ import annotations
 from collections import Counter
 
 from embodied.assets.records import Asset, Size
+from embodied.generate.furnish import mounting
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.likes import free_stretch, has_window
-from embodied.generate.furnish.mounting import (
-    Hanging,
-    along_stretches,
-    along_walls,
-    at,
-    ceiling_lamps,
-    detectors,
-    hang_first,
-    mount,
-    spot_behind,
-    stretches,
-)
 from embodied.generate.furnish.smalls import leave
 from embodied.generate.furnish.space import Thing, Wall
 from embodied.house.house import Opening
@@ -29,8 +18,8 @@ from embodied.house.house import Opening
 
 def hang_all(ctx: Context) -> None:
     """Everything on walls and ceiling, after the furniture stands."""
-    ceiling_lamps(ctx)
-    detectors(ctx)
+    mounting.ceiling_lamps(ctx)
+    mounting.detectors(ctx)
     switches(ctx)
     for hang in (radiators, curtains) if ctx.chance(0.5) else (curtains, radiators):
         hang(ctx)
@@ -60,8 +49,8 @@ def curtains(ctx: Context) -> None:
             if done is None and blind is not None and o.kind == "window" and ctx.chance(0.8):
                 drop = (o.head - o.sill) * ctx.rng.uniform(0.35, 1.0)
                 size = (s1 - s0 + 0.06, blind.size[1], drop)
-                hanging = Hanging(blind, o.head + 0.04 - drop, "blind", size=size, passage=True)
-                mount(ctx, hanging, wall, (s0 + s1) / 2)
+                hanging = mounting.Hanging(blind, o.head + 0.04 - drop, "blind", size=size, passage=True)
+                mounting.mount(ctx, hanging, wall, (s0 + s1) / 2)
 
 
 def _curtain(ctx: Context, asset: Asset, wall: Wall, s0: float, s1: float, o: Opening) -> Thing | None:
@@ -73,7 +62,7 @@ def _curtain(ctx: Context, asset: Asset, wall: Wall, s0: float, s1: float, o: Op
         return None
     for bottom in (0.015, max(o.sill - 0.12, 0.02)):
         size = (width + 2 * grow, asset.size[1], top - bottom)
-        done = mount(ctx, Hanging(asset, bottom, "curtain", size=size, passage=True), wall, middle)
+        done = mounting.mount(ctx, mounting.Hanging(asset, bottom, "curtain", size=size, passage=True), wall, middle)
         if done:
             return done
     return None
@@ -91,23 +80,25 @@ def radiators(ctx: Context) -> None:
                 asset = ctx.pick("radiator", most=(s1 - s0 + 0.2, 0.3, o.sill - 0.14), avoid=())
                 left -= _radiator(ctx, asset, wall, (s0 + s1) / 2)
     for wall in outer:
-        for a, b in stretches(wall):
+        for a, b in mounting.stretches(wall):
             if left and b - a > 0.7:
                 asset = ctx.pick("radiator", most=(min(b - a - 0.2, 1.5), 0.25, 1.0), avoid=())
                 left -= _radiator(ctx, asset, wall, (a + b) / 2)
 
 
 def _radiator(ctx: Context, asset: Asset | None, wall: Wall, s: float) -> bool:
-    return mount(ctx, Hanging(asset, 0.1, "heating", "radiator", away=0.015), wall, s) is not None
+    return mounting.mount(ctx, mounting.Hanging(asset, 0.1, "heating", "radiator", away=0.015), wall, s) is not None
 
 
 def wall_lamps(ctx: Context) -> None:
     """Sconces in halls, corridors and living rooms."""
     if not ctx.has("wall lamps") or not ctx.chance(0.45):
         return
-    hanging = Hanging(ctx.pick("wall lamp", most=(0.5, 0.35, 0.7)), 1.75, "wall_lamp", "wall lamp", margin=0.15)
-    for wall, s in along_walls(ctx.space.longest_walls[:2], at(0.25, 0.75)):
-        mount(ctx, hanging, wall, s)
+    hanging = mounting.Hanging(
+        ctx.pick("wall lamp", most=(0.5, 0.35, 0.7)), 1.75, "wall_lamp", "wall lamp", margin=0.15
+    )
+    for wall, s in mounting.along_walls(ctx.space.longest_walls[:2], mounting.at(0.25, 0.75)):
+        mounting.mount(ctx, hanging, wall, s)
 
 
 def switches(ctx: Context) -> None:
@@ -118,7 +109,7 @@ def switches(ctx: Context) -> None:
     double = ctx.pick("dimmer switch" if ctx.chance(0.3) else "double light switch", avoid=())
     if double is not None and ctx.chance(0.25) and ctx.space.area > 12:
         asset = double
-    hanging = Hanging(asset, 1.06, "electric", "light switch")
+    hanging = mounting.Hanging(asset, 1.06, "electric", "light switch")
     left = 2 if ctx.kind not in ("hall", "corridor") else 3
     for wall in ctx.space.walls:
         for s0, s1, o in wall.openings:
@@ -126,7 +117,7 @@ def switches(ctx: Context) -> None:
                 continue
             hinge_at_s0 = abs(wall.along_of(*(o.a if o.hinge == "a" else o.b)) - s0) < 1e-6
             sides = (s1 + 0.2, s0 - 0.2) if hinge_at_s0 else (s0 - 0.2, s1 + 0.2)
-            left -= hang_first(ctx, hanging, ((wall, s) for s in sides)) is not None
+            left -= mounting.hang_first(ctx, hanging, ((wall, s) for s in sides)) is not None
 
 
 def sockets(ctx: Context) -> None:
@@ -137,11 +128,11 @@ def sockets(ctx: Context) -> None:
     z = 1.1 if ctx.kind == "kitchen" else 0.26
     if ctx.kind == "kitchen" and ctx.chance(0.5):
         asset = ctx.pick("double socket", avoid=()) or asset
-    hanging = Hanging(asset, z, "electric", "wall socket")
+    hanging = mounting.Hanging(asset, z, "electric", "wall socket")
     left = 1 + (ctx.space.area > 9) + (ctx.space.area > 20)
-    for wall, s in along_walls(ctx.space.longest_walls, at(0.12, 0.88)):
+    for wall, s in mounting.along_walls(ctx.space.longest_walls, mounting.at(0.12, 0.88)):
         if left and wall.length > 1.2:
-            left -= mount(ctx, hanging, wall, s) is not None
+            left -= mounting.mount(ctx, hanging, wall, s) is not None
 
 
 MIDDLE = 1.5
@@ -153,14 +144,14 @@ def above_furniture(ctx: Context) -> None:
     for thing in ctx.things:
         if thing.role not in ctx.tables.alike["below pictures"]:
             continue
-        spot = spot_behind(ctx, thing)
+        spot = mounting.spot_behind(ctx, thing)
         top = thing.z - ctx.space.bottom + thing.size[2]
         if spot is None or top > 1.45:
             continue
         if thing.role == "tv stand":
             if not any(t.parent is thing and t.role == "television" for t in ctx.things):
                 screen = ctx.pick("wall television", most=(1.8, 0.2, 1.1))
-                mount(ctx, Hanging(screen, max(top + 0.2, 0.85), "television"), *spot)
+                mounting.mount(ctx, mounting.Hanging(screen, max(top + 0.2, 0.85), "television"), *spot)
             continue
         if thing.role in ctx.tables.alike["below mirrors"] and ctx.chance(0.6) and _mirror_over(ctx, thing, top, *spot):
             continue
@@ -173,7 +164,9 @@ def _mirror_over(ctx: Context, thing: Thing, top: float, wall: Wall, s: float) -
     if mirror is None:
         return None
     size = _mirror_size(mirror, min(thing.size[0] * 0.8, 1.0), 0.8)
-    return mount(ctx, Hanging(mirror, max(top + 0.25, 1.1), "mirror", size=size, margin=0.05), wall, s)
+    return mounting.mount(
+        ctx, mounting.Hanging(mirror, max(top + 0.25, 1.1), "mirror", size=size, margin=0.05), wall, s
+    )
 
 
 def pictures(ctx: Context) -> None:
@@ -196,7 +189,7 @@ def pictures(ctx: Context) -> None:
 def _picture_spots(wall: Wall) -> list[float]:
     """The middles of a wall and of its free stretches and, in long ones, two more; from the wall's middle outwards."""
     spots = {wall.length / 2}
-    for a, b in stretches(wall):
+    for a, b in mounting.stretches(wall):
         if b - a > 0.8:
             spots.add((a + b) / 2)
             if b - a > 3.2:
@@ -223,8 +216,8 @@ def _picture_group(ctx: Context, wall: Wall, s: float, width: float, lowest: flo
     for k in range(count):
         piece = asset if k == 0 else _art(ctx)
         if piece is not None:
-            hanging = Hanging(piece, z, "picture", size=(w, piece.size[1], h), margin=0.04)
-            hung += mount(ctx, hanging, wall, s + (k - (count - 1) / 2) * (w + 0.1)) is not None
+            hanging = mounting.Hanging(piece, z, "picture", size=(w, piece.size[1], h), margin=0.04)
+            hung += mounting.mount(ctx, hanging, wall, s + (k - (count - 1) / 2) * (w + 0.1)) is not None
     return hung
 
 
@@ -255,8 +248,10 @@ def mirrors(ctx: Context) -> None:
     sizes = [(2.4, 1.6), (1.6, 1.6)] if ctx.kind == "gym" else []
     low = 1.2 if "round" in mirror.tags else 0.25
     for w, h in (*sizes, (0.6, 1.6), (0.5, 1.3)):
-        hanging = Hanging(mirror, low, "mirror", size=_mirror_size(mirror, w, h), margin=0.03)
-        if hang_first(ctx, hanging, along_stretches(ctx.space.longest_walls, at(0.5, 0.25, 0.75))):
+        hanging = mounting.Hanging(mirror, low, "mirror", size=_mirror_size(mirror, w, h), margin=0.03)
+        if mounting.hang_first(
+            ctx, hanging, mounting.along_stretches(ctx.space.longest_walls, mounting.at(0.5, 0.25, 0.75))
+        ):
             return
 
 
