@@ -27,7 +27,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from embodied.envs.base import ActionError
 from embodied.records import parse, to_json
 from embodied.serve.driving import EncodedPanoramas, Live
-from embodied.serve.game import Game
+from embodied.serve.game import ACTS, Game
 from embodied.serve.results import summary
 from embodied.serve.screens import live_name, next_part, plan_of, screen_of
 from embodied.serve.sessions import Person, Sessions
@@ -311,10 +311,10 @@ class Server:
         if game is None or game.id != message["game"] or game.turn != message["turn"]:
             raise ActionError("this has changed in the meantime")
         role = next(r for r, p in game.people.items() if p == person.id)
-        if do not in ("moved", "stopped", "asked", "answered") or role != game.mover:
+        if do not in (*ACTS, "stopped", "asked", "answered") or role != game.mover:
             raise ActionError("it is not your turn")
         event.body.update(game=game.id)
-        if do == "moved":
+        if do in ACTS:
             event.body["candidate"] = int(message["candidate"])
         elif do == "asked":
             text, part = words(message["text"]), game.table.part

@@ -11,10 +11,12 @@ import functools
 import hashlib
 import hmac
 import math
+import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import cv2
 import numpy as np
@@ -23,6 +25,7 @@ from embodied.assets.decoding import jpeg
 from embodied.envs.continuous import Body, NavMeshCache
 from embodied.errors import UnableError
 from embodied.interface import Place, Pose
+from embodied.navigation.doors import MARK, place_named
 from embodied.navigation.free_space import EYE
 from embodied.render.camera import camera_at
 from embodied.render.panorama_file import PanoramaFile, beside
@@ -122,19 +125,24 @@ ENCODED_KEPT = 600
 class EncodedPanoramas:
     """The panoramas of the study's houses, six faces side by side; nothing else can be asked for."""
 
-    def __init__(self, files: Mapping[str, PanoramaFile], secret: str) -> None:
+    def __init__(self, files: Mapping[str, PanoramaFile], secret: str, open_world: Any = None) -> None:
         """
         Args:
           files: by house.
           secret: makes the names; only who was shown a viewpoint knows that of its panorama.
+          open_world: as of Live, for what differs from the files: doors and furniture.
         """
-        self._files, self._secret = files, secret.encode()
+        self._files, self._secret, self._lock = files, secret.encode(), threading.Lock()
+        self._open = open_world and functools.cache(open_world)
         self._place = {self.name(w, n): (w, n) for w, file in files.items() for n in range(len(file))}
         self.encoded = functools.lru_cache(maxsize=ENCODED_KEPT)(self._encode)
 
     def name(self, world: str, node: int) -> str:
-        """Of the panorama of a viewpoint, in addresses."""
-        return hmac.new(self._secret, f"{world}/{node}".encode(), hashlib.sha256).hexdigest()[:24]
+        """Of the panorama of a viewpoint, in addresses; `world` as Viewpoint has it."""
+        name = hmac.new(self._secret, f"{world}/{node}".encode(), hashlib.sha256).hexdigest()[:24]
+        if MARK in world:
+            self._place[name] = world, node
+        return name
 
     def has(self, name: str, size: str) -> bool:
         return name in self._place and size in FACE_SIZES
@@ -142,7 +150,11 @@ class EncodedPanoramas:
     def _encode(self, name: str, size: str) -> bytes:
         """A JPEG of the faces in the order of embodied.render.panorama.FACES."""
         world, node = self._place[name]
-        faces = self._files[world].rgb(node)
+        if (house := world.partition(MARK)[0]) == world:
+            faces = self._files[world].rgb(node)
+        else:
+            with self._lock:  # one thread at a time may draw
+                faces = place_named({house: self._open(house)}, world).panorama(node).rgb
         side = min(FACE_SIZES[size], faces.shape[1])
         if side != faces.shape[1]:
             faces = np.stack([cv2.resize(f, (side, side), interpolation=cv2.INTER_AREA) for f in faces])

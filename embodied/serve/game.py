@@ -30,6 +30,9 @@ POLICIES: Mapping[str, AgentMaker] = {
     name: functools.partial(lambda make, split: make(), make) for name, make in WITHOUT_LEARNING.items()
 }
 
+ACTS = {"moved": interface.Move, "opened": interface.Open, "closed": interface.Close}
+"""Actions of an agent that name a candidate, by the kind of their events."""
+
 
 @dataclass(frozen=True, eq=False)
 class Table:
@@ -195,10 +198,10 @@ class Game:
             if self.question is not None:
                 raise ActionError("the assistant has not answered yet")
             thought = _thought_of(event)
-            if event.kind != "moved":
+            if event.kind not in ACTS:
                 self._step(interface.Stop(thought), event.time)
             elif self.drive is None:
-                self._step(interface.Move(int(event.body["candidate"]), thought), event.time)
+                self._step(ACTS[event.kind](int(event.body["candidate"]), thought), event.time)
             else:
                 self._drive(self.drive, int(event.body["candidate"]), event.time)
         self.turn += 1
@@ -215,8 +218,9 @@ class Game:
         self._thought = len(self._seen)
         assert action is not None, "something new was seen"
         body = {} if action.thought is None else {"thought": parse(to_json(action.thought))}
-        if isinstance(action, interface.Move):
-            return "moved", {"candidate": action.candidate, **body}
+        for kind, act in ACTS.items():
+            if isinstance(action, act):
+                return kind, {"candidate": action.candidate, **body}
         if isinstance(action, interface.Ask):
             return "asked", {"question": action.question or "Can you help me?", **body}
         return "stopped", body

@@ -104,7 +104,8 @@ def open_study(
         sessions.apply(event)
     writer = ResultsWriter(folder, sessions)
     sessions.finished, sessions.judged = writer.game, writer.judged
-    return Opened(study, folder, Server(sessions, store, EncodedPanoramas(files, secret), secret, addresses, live))
+    pictures = EncodedPanoramas(files, secret, open_world and functools.partial(open_world, data))
+    return Opened(study, folder, Server(sessions, store, pictures, secret, addresses, live))
 
 
 def serve(opened: Opened, host: str, port: int) -> None:

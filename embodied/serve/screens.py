@@ -74,7 +74,7 @@ def game_of(game: Game, role: str, pictures: EncodedPanoramas) -> Screen:
     pose, request = game.situation.pose, detokenized(game.task.request)
     play = {"game": game.id, "turn": game.turn, "practice": game.practice, "yours": game.mover == role}
     words = {"advice": game.table.part.advice, "request": request, "said": conversation, "question": game.question}
-    seen = {"pano": pictures.name(world, pose.node), "yaw": pose.yaw, "pitch": pose.pitch}
+    seen = {"pano": pictures.name(game.env.seen_from(pose.node), pose.node), "yaw": pose.yaw, "pitch": pose.pitch}
     return {"screen": role, **play, **words, **seen}
 
 
@@ -85,9 +85,10 @@ def agent_of(game: Game, pictures: EncodedPanoramas) -> Screen:
     aim = None if seen.target is None else viewpoint(seen.target)
     target = None if aim is None else pictures.name(aim.world, aim.node)
     drives = {"live": live_name(game, pictures), "moves": [{"candidate": k} for k in range(len(ACTIONS))]}
-    moves = {"live": None, "moves": moves_of(seen, game.situation, pictures)}
+    moves = {"live": None, "moves": moves_of(seen, game, pictures)}
     return {
         **(moves if game.drive is None else drives),
+        "doors": doors_of(seen, game.situation),
         "words": list(seen.candidates.words if game.drive is None else ACTIONS),
         "instruction": detokenized(seen.instruction),
         "subtask": seen.mode is Mode.SUB,
@@ -106,15 +107,27 @@ def live_name(game: Game, pictures: EncodedPanoramas) -> str:
     return f"{game.id}/{pictures.name(game.id, game.turn)}"
 
 
-def moves_of(seen: Observation, situation: Situation, pictures: EncodedPanoramas) -> list[Screen]:
+def doors_of(seen: Observation, s: Situation) -> list[Screen]:
+    """Doors and parts of furniture that can be opened and closed, and where they are seen."""
+    things, parts, doors = s.world.house.placement_by_id, s.extras if isinstance(s.extras, dict) else {}, []
+    for event, k in (*(("opened", k) for k in seen.can_open), *(("closed", k) for k in seen.can_close)):
+        thing, _, part = parts.get(k, "").partition("/")
+        words = part.rstrip("_0123456789").replace("_", " ")
+        what = f"{words} of the {things[thing].object_class}" if part else "door"
+        yaw = round(float(s.pose.yaw + seen.candidates.bearing[k]), 4)
+        doors.append({"candidate": k, "event": event, "what": what, "yaw": yaw})
+    return doors
+
+
+def moves_of(seen: Observation, game: Game, pictures: EncodedPanoramas) -> list[Screen]:
     """The moves that are allowed: where they are seen, and the panorama to fetch in advance."""
-    c, at, pose = seen.candidates, situation.world.graph.positions, situation.pose
+    c, at, pose = seen.candidates, game.situation.world.graph.positions, game.situation.pose
     moves = []
-    for i, node in enumerate(situation.candidate_nodes):
+    for i, node in enumerate(game.situation.candidate_nodes):
         if c.allowed[i]:
             direction = {"yaw": round(float(pose.yaw + c.bearing[i]), 4), "pitch": round(float(c.slope[i]), 4)}
             metres = round(float(np.linalg.norm(at[node] - at[pose.node])), 2)
-            pano = pictures.name(situation.task.world, node)
+            pano = pictures.name(game.env.seen_from(node), node)
             moves.append({"candidate": i, **direction, "distance": metres, "pano": pano})
     return moves
 

@@ -2,9 +2,9 @@
 
 import { button, h, s, say, stored } from "./dom";
 import type { Connection } from "./socket";
-import { address, LEVEL, Panorama, prefetch } from "./panorama";
+import { address, LEVEL, Panorama, prefetch, side } from "./panorama";
 import { Plan } from "./plan";
-import type { AgentScreen, AssistantScreen, House, Said, Way } from "./types";
+import type { AgentScreen, AssistantScreen, Door, House, Said, Way } from "./types";
 
 const LONGEST = 2000;
 const SLOW = 1000; // milliseconds for a live picture, from which on the page says so
@@ -112,6 +112,7 @@ export class AgentView implements View<AgentScreen> {
   private readonly request = h("p", { class: "request" });
   private readonly told = h("div", {});
   private readonly asking = h("div", { class: "asking" });
+  private readonly doors = h("div", { class: "asking", role: "group", "aria-label": "Doors" });
   private readonly ending = h("div", { class: "ending" });
   private readonly words = new Words("Ask in your own words", "Ask", "ask", (text) => this.ask(text));
 
@@ -123,7 +124,7 @@ export class AgentView implements View<AgentScreen> {
       h(
         "div",
         { class: "side" },
-        card("Your task", this.request, this.told),
+        card("Your task", this.request, this.told, this.doors),
         card("Help", this.talk, this.asking),
         this.ending,
       ),
@@ -188,8 +189,10 @@ export class AgentView implements View<AgentScreen> {
   }
 
   private key(e: KeyboardEvent): void {
+    const plain = !e.ctrlKey && !e.metaKey && !e.altKey && !(e.target instanceof HTMLTextAreaElement);
+    if (plain && e.key === "o" && this.root.isConnected) this.doors.querySelector("button")?.click();
     const way = this.state?.live && this.root.isConnected ? this.state.moves[DRIVING[e.key] ?? -1] : undefined;
-    if (!way || e.ctrlKey || e.metaKey || e.altKey || e.target instanceof HTMLTextAreaElement) return;
+    if (!way || !plain) return;
     e.preventDefault();
     if (this.state.question === null) this.go(way);
   }
@@ -217,10 +220,24 @@ export class AgentView implements View<AgentScreen> {
       return;
     }
     this.view.offer(ways, (way) => this.go(way));
+    this.offerDoors();
+  }
+
+  /** Doors and furniture that can be opened or closed here; O takes the first, which is the nearest to the gaze. */
+  private offerDoors(): void {
+    const away = (d: Door): number => Math.abs(Math.atan2(Math.sin(d.yaw - this.view.yaw), Math.cos(d.yaw - this.view.yaw)));
+    const doors = this.state.question === null && !this.elsewhere ? [...this.state.doors] : [];
+    const buttons = doors.sort((a, b) => away(a) - away(b)).map((d, k) => {
+      const does = d.event === "opened" ? "Open" : "Close";
+      const act = (): void => this.act(d.event, { candidate: d.candidate });
+      return button(`${does} the ${d.what}, ${side(d.yaw - this.view.yaw)}${k || touched() ? "" : " (O)"}`, act, "question");
+    });
+    this.doors.replaceChildren(...buttons);
   }
 
   private turned(): void {
     if (!this.state || this.state.words.length) return;
+    this.offerDoors();
     const ways = this.state.question === null ? this.state.moves : [];
     this.corner.replaceChildren(this.elsewhere ? this.back() : compass(ways, this.view));
   }
@@ -235,7 +252,7 @@ export class AgentView implements View<AgentScreen> {
     this.turned();
   }
 
-  private act(what: "moved" | "stopped" | "asked", more: object = {}): void {
+  private act(what: "moved" | "opened" | "closed" | "stopped" | "asked", more: object = {}): void {
     this.connection.send({ do: what, game: this.state.game, turn: this.state.turn, ...more });
   }
 

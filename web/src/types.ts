@@ -2,7 +2,7 @@
 
 export interface Message {
   id: string;
-  do: "consent" | "ready" | "leave" | "house" | "judge" | "moved" | "stopped" | "asked" | "answered";
+  do: "consent" | "ready" | "leave" | "house" | "judge" | "moved" | "opened" | "closed" | "stopped" | "asked" | "answered";
   [name: string]: unknown;
 }
 
@@ -42,10 +42,18 @@ export interface Way {
   pano: string;
 }
 
+export interface Door {
+  candidate: number;
+  event: "opened" | "closed"; // what a press does
+  what: string;
+  yaw: number;
+}
+
 export interface AgentScreen extends Game {
   screen: "agent";
   live: string | null; // address of what somebody sees who drives
   moves: Way[];
+  doors: Door[];
   words: string[];
   instruction: string;
   subtask: boolean;
