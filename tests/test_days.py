@@ -53,8 +53,8 @@ def test_nobody_walks_through_walls_furniture_doors_or_others(seed):
     assert len(walks) > 10 and lives.doors
     rng = np.random.default_rng(seed)
     for p in [walks[i] for i in rng.permutation(len(walks))[:40]]:
-        moment = lives.at((p.begin + (p.end - p.begin) * rng.random()) / 3600)
-        now = lives.now(p.begin / 3600)
+        moment = lives.at(p.begin + (p.end - p.begin) * rng.random())
+        now = lives.now(p.begin)
         floor = floor_of(house, moment)
         places = {name: shapely.Point(f.place.position[:2]) for name, f in moment.people.items()}
         for name, at in places.items():
@@ -67,7 +67,7 @@ def test_the_same_seed_gives_the_same_day_and_people_sleep_at_night_and_eat_at_h
     house, lives = day(7)
     again = day_of(house, CATALOGUE, seed=7)
     assert lives.doors == again.doors
-    for time in ("7:45", "18:30", 12.0):
+    for time in ("7:45", "18:30", 43200.0):
         assert lives.at(time).openness == again.at(time).openness and spots(lives, time) == spots(again, time)
         assert {n: f.place for n, f in lives.at(time).people.items()} == {
             n: f.place for n, f in again.at(time).people.items()
@@ -76,7 +76,7 @@ def test_the_same_seed_gives_the_same_day_and_people_sleep_at_night_and_eat_at_h
     assert {s.activity for s in spots(lives, "3:00").values()} == {"sleeping"}
     lying = next(iter(lives.at("3:00").people.values()))
     assert lying.pose.joints["pelvis"][0] < -1.5
-    others = {s.activity for h in range(24) for s in spots(lives, h).values()}
+    others = {s.activity for h in range(24) for s in spots(lives, 3600 * h).values()}
     assert {"eating", "cooking", "washing", "out"} <= others
 
 
@@ -89,7 +89,7 @@ def test_living_people_answer_where_they_are_awake_and_move_while_an_episode_goe
     everywhere, living = Anna({house.name: graph}, inputs[1], split="test"), Residents(*inputs, split="test")
     manned = set()
     for hour in (3.0, 7.8, 12.5, 18.6):
-        awake = {n for n, p in lives.now(hour).items() if p.spot.activity not in ("sleeping", "out")}
+        awake = {n for n, p in lives.now(3600 * hour).items() if p.spot.activity not in ("sleeping", "out")}
         for node in nodes:
             task = Task(f"t{hour}", "hanna", house.name, Pose(node), FindObject("mug"), (0,), "find a mug", 2.0, 50)
             late = int(hour * 60) - minute_of(task.id)

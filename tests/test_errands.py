@@ -15,7 +15,7 @@ from embodied.house.moment import WIDEST, Moment
 from embodied.navigation.floor_ways import FloorWays
 from embodied.navigation.free_space import free_floor, opened, room_doors
 from embodied.navigation.graph import AGENT_RADIUS
-from embodied.people.errands import errand
+from embodied.people.day import errand
 
 SOMEBODY = people()["mei"]
 
@@ -33,10 +33,14 @@ def walks(seed: int, count: int):
         yield house, errand(house, SOMEBODY, ways.xy[a], ways.xy[b])
 
 
+def seconds(going) -> float:
+    return going.pieces[SOMEBODY.id][-1].begin
+
+
 def bodies_through_something(house, going) -> list[float]:
     """Seconds of an errand at which the body is not on the free floor, doors as they are then."""
     floors, wrong = {}, []
-    for t in np.arange(0, going.seconds, 0.2):
+    for t in np.arange(0, seconds(going), 0.2):
         moment = going.at(float(t))
         key = tuple(moment.openness.items())
         if key not in floors:
@@ -54,7 +58,7 @@ def test_nobody_walks_through_walls_furniture_or_doors_and_doors_are_closed_behi
     for house, going in walks(seed, 3):
         assert bodies_through_something(house, going) == []
         opened_doors += len(going.doors)
-        assert not going.at(going.seconds + 9).openness
+        assert not going.at(seconds(going) + 9).openness
         for _, opens, closes in going.doors:
             assert max(going.at(opens + 1.5).openness.values()) == 1.0 and closes > opens
     assert opened_doors
@@ -62,11 +66,12 @@ def test_nobody_walks_through_walls_furniture_or_doors_and_doors_are_closed_behi
 
 def test_who_opens_a_door_reaches_its_handle_where_it_is_near_and_who_sits_down_ends_on_the_seat():
     house, going = next((h, e) for h, e in walks(7, 5) if e.doors)
-    assert any(x.door is not None for x in going.legs)
-    start = going.legs[-1].course.line[-1, 1:3]
+    legs = [p.leg for p in going.pieces[SOMEBODY.id] if p.leg]
+    assert any(x.door is not None for x in legs)
+    start = legs[-1].course.line[-1, 1:3]
     seat = (float(start[0]) - 0.4, float(start[1]), 0.45, 0.0)
-    there = errand(house, SOMEBODY, going.legs[0].course.line[0, 1:3], start, seat)
-    last = there.at(there.seconds).people[SOMEBODY.id]
+    there = errand(house, SOMEBODY, legs[0].course.line[0, 1:3], start, seat)
+    last = there.at(seconds(there)).people[SOMEBODY.id]
     pelvis = last.place.points(joint_positions(SOMEBODY, last.pose)["pelvis"][None])[0]
     np.testing.assert_allclose(pelvis, [*seat[:2], 0.45 + SOMEBODY.seat], atol=1e-6)
     assert math.isclose(there.doors[0][1], going.doors[0][1]) and WIDEST > 1

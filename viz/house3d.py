@@ -14,8 +14,10 @@ import rerun as rr
 from scipy.spatial import cKDTree
 
 from embodied.assets.decoding import read_picture
+from embodied.assets.people import people, posed
 from embodied.assets.records import Finish, MeshPart
 from embodied.geometry import rotation
+from embodied.house.moment import Moment
 from embodied.render.gloss import texels_at
 from embodied.scene.house_meshes import Part
 from embodied.scene.lit_pages import LitMesh, LitPages
@@ -77,6 +79,16 @@ def log_house(recording: rr.RecordingStream, meshes: Sequence[LightMesh]) -> Non
         shape |= {"vertex_normals": mesh.normals, "vertex_texcoords": mesh.uv}
         drawn = rr.Mesh3D(**shape, vertex_colors=mesh.colors, albedo_texture=mesh.picture)
         recording.log(mesh.path, drawn, static=True)
+
+
+def log_people(recording: rr.RecordingStream, moment: Moment) -> None:
+    """Log who moves about, as they are now."""
+    for name, f in moment.people.items():
+        parts, turn = posed(people()[f.person], f.pose, 1), f.place.rotation.T
+        pieces = [(f.place.points(p.vertices), p.normals @ turn, vertex_colors(p), p.faces) for p in parts]
+        mesh = _joined(f"people/{name}", pieces)
+        shape = {"vertex_positions": mesh.positions, "triangle_indices": mesh.faces, "vertex_normals": mesh.normals}
+        recording.log(mesh.path, rr.Mesh3D(**shape, vertex_colors=mesh.colors))
 
 
 def lit_meshes(lit: LitPages, hidden: frozenset[str] = frozenset()) -> tuple[LightMesh, ...]:

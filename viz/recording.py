@@ -4,6 +4,7 @@ Entity tree (timeline 'step'):
   house/<room>/<owner>   meshes, once              graph/...        viewpoints and edges, once
   task/goal              where the goal is, once   agent/camera     pose, pinhole and what it sees
   agent/path, agent/route  walked, spoken of       view/panorama, view/target
+  people/NAME            who moves about
   view/panorama/recognised   what the agent's encoder recognises
   text/...               request, instruction, dialogue, goals (HARI's stack)
   plot/...               distance to the goal, requests, HARI's cost, probabilities     events   a log
@@ -23,6 +24,7 @@ from scipy.spatial.transform import Rotation
 
 from embodied.action_spaces import doors_moved
 from embodied.assets.decoding import jpeg
+from embodied.house.moment import Moment
 from embodied.interface import Ask, Close, Episode, Mode, Move, Open, Pose, Step, Stop, Task
 from embodied.kinds.task_kind import kind_named
 from embodied.language.plain_language import detokenized
@@ -32,7 +34,7 @@ from embodied.render.camera import camera_at
 from embodied.render.panorama import Panorama, Recognised
 from embodied.render.photograph import PhotoCamera
 from embodied.viz.episode_log import EpisodeLog, question_of
-from embodied.viz.house3d import light_meshes, lit_meshes, log_house
+from embodied.viz.house3d import light_meshes, lit_meshes, log_house, log_people
 from embodied.viz.sinks import Sinks, blueprint_of, open_recording
 from embodied.world import World
 
@@ -98,6 +100,7 @@ def record(
     pictures: PictureSizes = PictureSizes(),
     budget: int | None = None,
     recognise: Recognise | None = None,
+    living: Callable[[int], Moment] | None = None,
 ) -> Iterator[Step]:
     """Pass `steps` on while logging each: put it between a rollout and whoever consumes it.
 
@@ -117,6 +120,8 @@ def record(
         recording.set_time("step", sequence=index)
         if step.seconds is not None:  # people took part
             recording.set_time("seconds", duration=step.seconds)
+        if living is not None:
+            log_people(recording, living(index))
         log_step(recording, world, task, step, state, views.with_closed(step.pose.node, closed))
         closed ^= doors_moved(step, world.graph, closed)
         yield step
@@ -134,6 +139,7 @@ def record_episode(
     pictures: PictureSizes = PictureSizes(),
     watch: Callable[[Sequence[Step]], Iterable[Step]] = iter,
     recognise: Recognise | None = None,
+    living: Callable[[int], Moment] | None = None,
 ) -> None:
     """Record a finished episode of `world`, with the layout that suits it.
 
@@ -142,7 +148,7 @@ def record_episode(
         said to be. None for an agent that looks at no pictures.
       pictures: their sizes, and the camera.
       watch: wraps the iterator over steps (a progress bar).
-      recognise: names what the agent recognises in a panorama of `eyes`.
+      recognise, living: as of `record`.
 
     Raises:
       OSError: the file could not be written to its end, or a viewer went away.
@@ -151,8 +157,8 @@ def record_episode(
     seen = None if eyes is None else eyes.pictures
     layout = blueprint_of(world.house, episode, seen)
     with open_recording(sinks, layout, name=detokenized(episode.task.request), properties=about) as recording:
-        how: dict[str, Any] = {"eyes": eyes, "pictures": pictures, "budget": episode.budget, "recognise": recognise}
-        for _ in record(recording, world, episode.task, watch(episode.steps), **how):
+        how: dict[str, Any] = {"eyes": eyes, "pictures": pictures, "recognise": recognise, "living": living}
+        for _ in record(recording, world, episode.task, watch(episode.steps), budget=episode.budget, **how):
             pass
 
 

@@ -190,8 +190,8 @@ def transforms(person: PersonModel, pose: BodyPose) -> np.ndarray:
     return out
 
 
-def rotation_of(vector: Vector) -> np.ndarray:
-    """(3, 3) the rotation of a rotation vector (Rodrigues' formula)."""
+def rotation_of(vector: Vector | np.ndarray) -> np.ndarray:
+    """(3, 3) the rotation of a rotation vector (3,) (Rodrigues' formula)."""
     angle = math.sqrt(sum(x * x for x in vector))
     if angle < 1e-9:
         return np.eye(3)

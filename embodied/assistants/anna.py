@@ -110,7 +110,7 @@ class Residents(Anna):
         return day_of(dataclasses.replace(house, placements=alive), self._catalogue(), seed=0)
 
     def _rooms(self, name: str, minute: int) -> list[str]:
-        day, time = self._day(name), minute / 60
+        day, time = self._day(name), minute * 60
         awake = {n for n, p in day.now(time).items() if p.leg or p.spot.activity != "sleeping"}
         at = (p.place.position for n, p in day.at(time).people.items() if n in awake)
         return [room_at(day.house, np.add(place, (0, 0, 0.5))) or "" for place in at]

@@ -2,8 +2,8 @@
 
 Generates a furnished house with people in it, lights it and renders the panorama of every viewpoint. Then one agent
 looks for an object along the shortest path, and a trained agent that has never seen this house finds another one by
-asking the people. Both episodes are recorded for Rerun; --video also films the second. At last somebody who lives there
-walks and sits down, filmed as DIR/walk.mp4.
+asking the people, while others walk about. Both episodes are recorded for Rerun; --video also films the second. At last
+somebody who lives there walks and sits down, filmed as DIR/walk.mp4.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from embodied.cli.common import Furnished, Printed, bar, catalogue_of, check_machine, fetch, note, show
 from embodied.cli.rollout import Filmed, Viewers, check_viewer, film
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from embodied.house.house import House
     from embodied.interface import Episode, Route
     from embodied.navigation.graph import NavGraph
-    from embodied.viz.recording import Recognise
+    from embodied.people.day import Day
     from embodied.viz.sinks import Sinks
     from embodied.world import World
 
@@ -180,67 +180,68 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route]) -> di
     episode = play(make, hanna_policies(agent, bank)["learned"], [task], seed=args.seed, agent="learned")[0]
     if args.video:
         film(world, episode, args.video, args.video_size)
-    recognise = Detector.load(encoder).recognise
-    return recorded(world, episode, Sinks(args.out / "help.rrd", args.connect), eyes=world, recognise=recognise)
+    how: dict[str, Any] = {"eyes": world, "recognise": Detector.load(encoder).recognise}
+    if (walker := somebody_walks(world)) is not None:
+        day, _, begin, end = walker
+        how["living"] = lambda step: day.at(begin + (end - begin) * step / len(episode.steps))
+    return recorded(world, episode, Sinks(args.out / "help.rrd", args.connect), **how)
 
 
-def film_a_walk(path: Path, world: World) -> Path | None:
-    """Film somebody of the household who walks, through a door if one is closed, and sits down; None where nobody
-    does."""
-    import numpy as np
-    import shapely
-
-    from embodied.cli.rollout import VIDEO_ANGLE
-    from embodied.house.moment import Moment
-    from embodied.navigation.free_space import sight_floor
+def somebody_walks(world: World) -> tuple[Day, str, float, float] | None:
+    """The day of the household, and who walks in it from and until when, through a door if one is closed, and sits
+    down; None where nobody does."""
     from embodied.people.day import day_of
-    from embodied.viz.video import FPS, write_video
-    from embodied.world import SLACK
 
-    day, eyes, sight = day_of(world.house, world.catalogue, seed=0), world.graph.positions, sight_floor(world.house, 0)
-    walks = []
+    day, walks = day_of(world.house, world.catalogue, seed=0), []
     for name, own in day.pieces.items():
         doors = [p.begin for p in own if p.leg and p.leg.door]
         for a, b in pairwise(p for p in own if p.leg is None and p.settled[0] == p.settled[1]):
             if b.spot.seat and a.spot.activity != "out" and a.end < b.begin:
                 opens = any(a.end < t < b.begin for t in doors)
                 walks.append((opens, -abs(b.begin - a.end - WALK_SECONDS), name, a.end, b.begin))
-    if not walks:
+    return (day, *max(walks)[2:]) if walks else None
+
+
+def film_a_walk(path: Path, world: World) -> Path | None:
+    """Film `somebody_walks`; None where nobody does."""
+    import numpy as np
+    import shapely
+
+    from embodied.cli.rollout import VIDEO_ANGLE
+    from embodied.house.moment import Moment
+    from embodied.navigation.free_space import sight_floor
+    from embodied.viz.video import FPS, write_video
+    from embodied.world import SLACK
+
+    if (walker := somebody_walks(world)) is None:
         return None
-    *_, name, begin, end = max(walks)
+    day, name, begin, end = walker
+    eyes, sight = world.graph.positions, sight_floor(world.house, 0)
 
     def frames() -> Iterator[np.ndarray]:
         node = -1
         for now in np.arange(begin, end + 1, 1 / FPS):
-            world.show(moment := day.at(now / 3600), slack=SLACK)
+            world.show(moment := day.at(now), slack=SLACK)
             at = np.array(moment.people[name].place.position)
             far = np.hypot(*(eyes - at)[:, :2].T)
             line = shapely.linestrings([[eye[:2], at[:2]] for eye in eyes])
             near = np.flatnonzero((far > 1.2) & (far < 6) & shapely.covers(sight, line))
             node = node if node in near or not len(near) else min(near, key=lambda n: abs(far[n] - 2.5))
-            yaw = math.atan2(*(at - eyes[node])[1::-1])
-            yield world.camera(eyes[node], yaw, -0.25, VIDEO_ANGLE, WALK_SIZE).rgb
+            yield world.camera(eyes[node], math.atan2(*(at - eyes[node])[1::-1]), -0.25, VIDEO_ANGLE, WALK_SIZE).rgb
 
     write_video(path, frames(), WALK_SIZE)
     world.show(Moment())
     return path
 
 
-def recorded(
-    world: World, episode: Episode, sinks: Sinks, *, eyes: World | None = None, recognise: Recognise | None = None
-) -> dict:
-    """Record an episode; what is worth telling about it.
-
-    Args:
-      eyes: the world whose panoramas the agent looked at; None where it looks at none.
-      recognise: names what the agent recognises there.
-    """
+def recorded(world: World, episode: Episode, sinks: Sinks, **how: Any) -> dict:
+    """Record an episode, `how` as of `record_episode`; what is worth telling about it."""
     from embodied.kinds.metrics import navigation_error, spl, success
     from embodied.viz.recording import record_episode
 
     assert sinks.rrd is not None, "a file is always written"
     watch = lambda steps: bar(steps, "recording", "step")
-    record_episode(world, episode, sinks, eyes=eyes, watch=watch, recognise=recognise)
+    record_episode(world, episode, sinks, watch=watch, **how)
     return {
         "agent": episode.agent,
         "request": episode.task.request,

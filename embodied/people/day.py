@@ -1,4 +1,4 @@
-"""A day of a household: who is where at which hour, doing what, and the walks between, through doors.
+"""A day of a household: who is where at which hour, doing what, and the walks between, through doors; or one errand.
 
 One person walks at a time; the others wait until the way is free. Days are on the ground floor.
 """
@@ -103,11 +103,10 @@ class Day:
     figures: Mapping[str, Person]
     """By name, 'adult_1'."""
     pieces: Mapping[str, Sequence[Piece]]
-    doors: Sequence[tuple[str, float, float]]
-    """Opening, and seconds at which it begins to open and to close."""
+    doors: errands.Doors
 
     def at(self, time: str | float) -> Moment:
-        """The house at a time, '18:30' or hours from 0 to 24: everybody in it, and the doors that they open."""
+        """The house at a time, '18:30' or seconds since midnight: everybody in it, and the doors that they open."""
         now = seconds_of(time)
         home = {n: p for n, p in self.now(time).items() if p.spot.activity != "out" or p.leg}
         figures = {n: self._figure(self.figures[n], p, now) for n, p in home.items()}
@@ -126,7 +125,7 @@ class Day:
         if spot.seat is not None and settled > 0:
             b = sitting(limbs, b, np.array(spot.seat), spot.heading if spot.bed else spot.front, min(settled, 1.0))
         place, pose = solved(limbs, b)
-        upper = POSES[ACTIVITIES[spot.activity]["pose"]].joints
+        upper = POSES[ACTIVITIES[spot.activity]["pose"]].joints if spot.activity else {}
         if spot.bed is not None and settled > 1:
             hips = LYING_BACK - limbs.joints["pelvis"][2]
             lies = RigidPose.upright(spot.bed, yaw_facing(spot.front)), Pose(upper, hips)
@@ -139,15 +138,17 @@ class Day:
 
 
 def seconds_of(time: str | float) -> float:
-    """Seconds since midnight of '18:30', or of hours.
+    """Seconds since midnight of '18:30', or of seconds.
 
     Raises:
       ValueError: no time of a day.
     """
-    whole, _, minutes = str(time).partition(":")
-    if not re.fullmatch(r"[\d.]+(:[0-5]\d)?", str(time)) or not 0 <= float(whole) <= 24:
-        raise ValueError(f"a time should be like '18:30', or hours from 0 to 24, got {time!r}")
-    return 3600 * float(whole) + 60 * float(minutes or 0)
+    if re.fullmatch(r"\d\d?:[0-5]\d", str(time)):
+        hours, _, minutes = str(time).partition(":")
+        time = 3600 * int(hours) + 60 * int(minutes)
+    if isinstance(time, str) or not 0 <= time <= 86400:
+        raise ValueError(f"a time should be like '18:30', or seconds since midnight, got {time!r}")
+    return time
 
 
 def day_of(house: House, catalogue: Catalogue, *, seed: int) -> Day:
@@ -173,6 +174,29 @@ def day_of(house: House, catalogue: Catalogue, *, seed: int) -> Day:
     for when, name, activity in sorted(wishes):
         planner.go(name, activity, when)
     return Day(house, figures, planner.pieces, planner.doors)
+
+
+def errand(
+    house: House, person: Person, start: Sequence[float], goal: Sequence[float], seat: Sequence[float] | None = None
+) -> Day:
+    """The day of one person, by id, who goes from second 0 on over the ground floor between the free places nearest to
+    (x, y) points, away from things where there is room, and onto a seat beside the goal: x, y and z of the middle of
+    what is sat on, and the heading of its front."""
+    rest = opened(house, closed_doors(house))
+    ways = FloorWays(rest, stairs=False)
+    swings = [Swing(house, o) for o in house.openings if o.id in closed_doors(house)]
+    swept = shapely.union_all([s.area for s in swings])
+    free = np.flatnonzero(~shapely.intersects_xy(swept, *ways.xy.T))  # nobody stands in the way of a leaf
+    begin, end = (int(free[np.linalg.norm(ways.xy[free] - p, axis=1).argmin()]) for p in (start[:2], goal[:2]))
+    line = errands.smooth_line(ways.xy[ways.wide_ways(np.array([end])).cells(begin)], walkable(rest))
+    sits, front = (None, None) if seat is None else ((seat[0], seat[1], seat[2]), seat[3])
+    legs, doors = legs_along(Limbs(person), ways.world(line), swings, turned=(None, front))
+    _, heading = legs[-1].course.body(math.inf)
+    spot = DaySpot("", "", (line[-1, 0], line[-1, 1]), heading, sits, front=front or 0.0)
+    pieces = [Piece(leg.begin, leg.end, spot, leg=leg) for leg in legs]
+    pieces.append(Piece(legs[-1].end, legs[-1].end + SETTLING[spot.settled], spot, (0.0, spot.settled)))
+    pieces.append(Piece(pieces[-1].end, 86400.0, spot, (spot.settled, spot.settled)))
+    return Day(house, {person.id: person}, {person.id: pieces}, doors)
 
 
 class _Planner:

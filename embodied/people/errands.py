@@ -1,4 +1,4 @@
-"""Errands: somebody goes through a house, opens the doors on the way, and may sit down at the end."""
+"""Ways through a house, and the doors that somebody opens on them."""
 
 from __future__ import annotations
 
@@ -13,17 +13,15 @@ import numpy as np
 import shapely
 from scipy.ndimage import uniform_filter1d
 
-from embodied.assets.people import Person
 from embodied.geometry import wrap
 from embodied.house.house import House, Opening
-from embodied.house.moment import WIDEST, Moment, MovingPerson
+from embodied.house.moment import WIDEST
 from embodied.house.shapes import inward
-from embodied.navigation.floor_ways import FloorWays
-from embodied.navigation.free_space import closed_doors, leaves, opened
-from embodied.navigation.graph import AGENT_RADIUS, walkable
-from embodied.people.gait import Bearing, Course, Limbs, sitting, smooth, solved, turn, walk
+from embodied.navigation.free_space import leaves
+from embodied.navigation.graph import AGENT_RADIUS
+from embodied.people.gait import Bearing, Course, Limbs, smooth, turn, walk
 
-SIT_SECONDS, DOOR_SECONDS = 1.8, 1.4
+DOOR_SECONDS = 1.4
 HANDLE_REACH, WAY_STEP, BODY_GAP, LEAST_TURN = 0.85, 0.05, 0.45, 0.1
 """Metres from which a hand goes to the handle of a door, between the points of a way, and between two people's middles
 at least; radians below which nobody turns on the spot."""
@@ -31,7 +29,7 @@ at least; radians below which nobody turns on the spot."""
 
 @dataclass(frozen=True, eq=False)
 class ErrandLeg:
-    """Part of an errand, seconds: a walk, a turn, or standing while the right hand opens a door."""
+    """Part of a way, seconds: a walk, a turn, or standing while the right hand opens a door."""
 
     begin: float
     end: float
@@ -52,52 +50,10 @@ Doors: TypeAlias = Sequence[tuple[str, float, float]]
 """Openings, with the seconds at which they begin to open and to close."""
 
 
-@dataclass(frozen=True, eq=False)
-class Errand:
-    """Who goes where, from second 0 on, through which doors, and onto a seat: x, y and z of the middle of what is sat
-    on at the end and the heading of its front."""
-
-    person: Person
-    legs: Sequence[ErrandLeg]
-    doors: Doors
-    seat: Sequence[float] | None
-
-    @property
-    def seconds(self) -> float:
-        """Seconds until the person is there."""
-        return self.legs[-1].end + SIT_SECONDS * (self.seat is not None)
-
-    def at(self, seconds: float) -> Moment:
-        """The house at a time: the person, by id, and the doors that are open because of them."""
-        leg = next((x for x in self.legs if seconds < x.end), self.legs[-1])
-        limbs, bearing = Limbs(self.person), leg.bearing(seconds)
-        if self.seat is not None and seconds > self.legs[-1].end:
-            *middle, front = self.seat
-            bearing = sitting(limbs, bearing, np.array(middle), front, (seconds - self.legs[-1].end) / SIT_SECONDS)
-        figure = MovingPerson(self.person.id, *solved(limbs, bearing))
-        return Moment(openness=openness(self.doors, seconds), people={self.person.id: figure})
-
-
 def openness(doors: Doors, seconds: float) -> dict[str, float]:
     """How far doors are open at a time, those that are not closed."""
     moving = (x for x in doors if x[1] < seconds < x[2] + DOOR_SECONDS)
     return {i: smooth((seconds - a) / DOOR_SECONDS) - smooth((seconds - b) / DOOR_SECONDS) for i, a, b in moving}
-
-
-def errand(
-    house: House, person: Person, start: Sequence[float], goal: Sequence[float], seat: Sequence[float] | None = None
-) -> Errand:
-    """The way over the ground floor between the free places nearest to (x, y) points, away from things where there is
-    room, with a seat beside the goal (`Errand.seat`)."""
-    rest = opened(house, closed_doors(house))
-    ways = FloorWays(rest, stairs=False)
-    swings = [Swing(house, o) for o in house.openings if o.id in closed_doors(house)]
-    swept = shapely.union_all([s.area for s in swings])
-    free = np.flatnonzero(~shapely.intersects_xy(swept, *ways.xy.T))  # nobody stands in the way of a leaf
-    begin, end = (int(free[np.linalg.norm(ways.xy[free] - p, axis=1).argmin()]) for p in (start[:2], goal[:2]))
-    line = smooth_line(ways.xy[ways.wide_ways(np.array([end])).cells(begin)], walkable(rest))
-    turned = None, None if seat is None else float(seat[3])
-    return Errand(person, *legs_along(Limbs(person), ways.world(line), swings, turned=turned), seat)
 
 
 def legs_along(

@@ -19,8 +19,6 @@ SKIN = 80.0
 """Percentile of the flesh's distances from a bone's line that is the radius of its capsule."""
 AWAY = -100.0
 """Height at which the capsules of who is not there wait, metres."""
-UNSEEN = 3
-"""Geom group of the capsules: viewers and `World.follow` show the people themselves."""
 
 
 @functools.cache
@@ -46,7 +44,7 @@ def add_person(spec: mujoco.MjSpec, name: str, person: Person) -> None:
     for joint, ((a, b), radius) in capsules(person.id).items():
         body = spec.worldbody.add_body(name=f"{name}/{joint}", mocap=True, pos=[0.0, 0.0, AWAY])
         kind = mujoco.mjtGeom.mjGEOM_CAPSULE
-        body.add_geom(type=kind, size=[radius, 0.0, 0.0], fromto=[*a, *b], group=UNSEEN)
+        body.add_geom(type=kind, size=[radius, 0.0, 0.0], fromto=[*a, *b], group=3)  # that viewers hide
 
 
 def stand_people(model: mujoco.MjModel, data: mujoco.MjData, moment: Moment) -> None:
