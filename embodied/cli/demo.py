@@ -220,14 +220,15 @@ def film_a_walk(path: Path, world: World) -> Path | None:
 
     def frames() -> Iterator[np.ndarray]:
         node = -1
-        for now in np.arange(begin, end + 1, 1 / FPS):
+        for now in np.arange(begin, end + 1, 2 / FPS):
             world.show(moment := day.at(now), slack=SLACK)
             at = np.array(moment.people[name].place.position)
             far = np.hypot(*(eyes - at)[:, :2].T)
             line = shapely.linestrings([[eye[:2], at[:2]] for eye in eyes])
             near = np.flatnonzero((far > 1.2) & (far < 6) & shapely.covers(sight, line))
             node = node if node in near or not len(near) else min(near, key=lambda n: abs(far[n] - 2.5))
-            yield world.camera(eyes[node], math.atan2(*(at - eyes[node])[1::-1]), -0.25, VIDEO_ANGLE, WALK_SIZE).rgb
+            yaw = math.atan2(*(at - eyes[node])[1::-1])
+            yield from [world.camera(eyes[node], yaw, -0.25, VIDEO_ANGLE, WALK_SIZE).rgb] * 2
 
     write_video(path, frames(), WALK_SIZE)
     world.show(Moment())
