@@ -87,8 +87,8 @@ def log_people(recording: rr.RecordingStream, moment: Moment) -> None:
         parts, turn = posed(people()[f.person], f.pose, 1), f.place.rotation.T
         pieces = [(f.place.points(p.vertices), p.normals @ turn, vertex_colors(p), p.faces) for p in parts]
         mesh = _joined(f"people/{name}", pieces)
-        shape = {"vertex_positions": mesh.positions, "triangle_indices": mesh.faces, "vertex_normals": mesh.normals}
-        recording.log(mesh.path, rr.Mesh3D(**shape, vertex_colors=mesh.colors))
+        shape: dict[str, Any] = {"vertex_positions": mesh.positions, "triangle_indices": mesh.faces}
+        recording.log(mesh.path, rr.Mesh3D(**shape, vertex_normals=mesh.normals, vertex_colors=mesh.colors))
 
 
 def lit_meshes(lit: LitPages, hidden: frozenset[str] = frozenset()) -> tuple[LightMesh, ...]:

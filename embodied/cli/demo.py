@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from embodied.viz.sinks import Sinks
     from embodied.world import World
 
-WALK_SECONDS, WALK_SIZE = 10.0, (240, 320)
-"""Of the walk that is filmed, about, and height and width of its frames, pixels."""
+WALK_SECONDS, WALK_SIZE = 20.0, (240, 320)
+"""Of the walk that is filmed, at most, and height and width of its frames, pixels."""
 SEED = 3
 """The demo house: a flat that is lit and drawn in a few minutes on two cores."""
 
@@ -188,17 +188,17 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route]) -> di
 
 
 def somebody_walks(world: World) -> tuple[Day, str, float, float] | None:
-    """The day of the household, and who walks in it from and until when, through a door if one is closed, and sits
-    down; None where nobody does."""
+    """The day of the household, and who walks in it from and until when, through a door if one is closed, far, and
+    sits down; None where nobody does."""
     from embodied.people.day import day_of
 
     day, walks = day_of(world.house, world.catalogue, seed=0), []
     for name, own in day.pieces.items():
         doors = [p.begin for p in own if p.leg and p.leg.door]
         for a, b in pairwise(p for p in own if p.leg is None and p.settled[0] == p.settled[1]):
-            if b.spot.seat and a.spot.activity != "out" and a.end < b.begin:
+            if b.spot.seat and a.spot.activity != "out" and 0 < b.begin - a.end < WALK_SECONDS:
                 opens = any(a.end < t < b.begin for t in doors)
-                walks.append((opens, -abs(b.begin - a.end - WALK_SECONDS), name, a.end, b.begin))
+                walks.append((opens, math.dist(a.spot.stand, b.spot.stand), name, a.end, b.begin))
     return (day, *max(walks)[2:]) if walks else None
 
 
@@ -226,7 +226,7 @@ def film_a_walk(path: Path, world: World) -> Path | None:
             far = np.hypot(*(eyes - at)[:, :2].T)
             line = shapely.linestrings([[eye[:2], at[:2]] for eye in eyes])
             near = np.flatnonzero((far > 1.2) & (far < 6) & shapely.covers(sight, line))
-            node = node if node in near or not len(near) else min(near, key=lambda n: abs(far[n] - 2.5))
+            node = node if node in near or not len(near) else int(min(near, key=lambda n: abs(far[n] - 2.5)))
             yaw = math.atan2(*(at - eyes[node])[1::-1])
             yield from [world.camera(eyes[node], yaw, -0.25, VIDEO_ANGLE, WALK_SIZE).rgb] * 2
 

@@ -568,7 +568,7 @@ def _together(tiles: Sequence[np.ndarray]) -> np.ndarray:
     """(HALF_TILE, HALF_TILE, 4) as `_Hides.tiles` of several things."""
     if len(tiles) == 1:
         return tiles[0]
-    out = tiles[0].copy() if tiles else np.tile(np.float32([1, 0, 0, 0]), (HALF_TILE, HALF_TILE, 1))
+    out = tiles[0].copy() if tiles else np.tile(np.array([1, 0, 0, 0], np.float32), (HALF_TILE, HALF_TILE, 1))
     for both in tiles[1:]:
         out[..., :1] *= both[..., :1]
         out[..., 1:] += both[..., 1:]
