@@ -251,6 +251,6 @@ def test_a_flipped_byte_is_noticed_where_it_matters(stored):
         assert file.damaged() == ((1, "depth"),)
         file.read(0)
         with pytest.raises(PanoramaFileError, match="depth of node 1"):
-            file.depth(1)
+            file.read(1)
         with pytest.raises(IndexError, match="nodes 0 to 2"):
-            file.rgb(3)
+            file.read(3)

@@ -62,13 +62,9 @@ class Material:
         if wrong := [rule for rule, holds in rules.items() if not holds]:
             raise ValueError(wrong[0])
 
-    @functools.cached_property
-    def _painter(self) -> Callable[[Canvas], Maps]:
-        return recipe_of(self.maps)
-
     def draw(self, n: int, *, rng: np.random.Generator) -> Maps:
         """The maps, n pixels wide."""
-        return self._painter(Canvas(n, self.tile, rng))
+        return recipe_of(self.maps)(Canvas(n, self.tile, rng))
 
 
 def read_materials(where: str, table: Row) -> Mapping[str, Material]:

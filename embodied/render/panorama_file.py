@@ -104,18 +104,6 @@ class PanoramaFile:
         """
         return _Stored(self, {channel: self._checked(node, channel) for channel in CHANNELS}, node)
 
-    def rgb(self, node: int) -> np.ndarray:
-        """(6, s, s, 3) uint8."""
-        return self.decoded(self._checked(node, "rgb"), node, "rgb")
-
-    def depth(self, node: int) -> np.ndarray:
-        """(6, s, s) float32 metres along each face's axis, to 0.5 mm; inf where nothing is."""
-        return self.decoded(self._checked(node, "depth"), node, "depth")
-
-    def ids(self, node: int) -> np.ndarray:
-        """(6, s, s) int32."""
-        return self.decoded(self._checked(node, "ids"), node, "ids")
-
     def damaged(self) -> tuple[tuple[int, str], ...]:
         """(node, channel) of every picture that does not match its checksum; reads the whole file."""
         return tuple((node, c) for node in range(len(self)) for c in CHANNELS if self._data(node, c) is None)
@@ -141,7 +129,8 @@ class PanoramaFile:
         return data
 
     def decoded(self, data: bytes, node: int, channel: str) -> np.ndarray:
-        """The faces of a picture as `rgb`, `depth` and `ids` return them.
+        """The faces of a picture: (6, s, s, 3) uint8 'rgb', (6, s, s) float32 'depth', metres along each face's axis to
+        0.5 mm, inf where nothing is, or (6, s, s) int32 'ids'.
 
         Raises:
           PanoramaFileError: it is none of this file's size.

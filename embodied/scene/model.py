@@ -83,27 +83,17 @@ class Scene:
     """Part.kind of every geom; 'collision' for collision boxes."""
     room_of_geom: tuple[str, ...]
     """Part.room of every geom; '' for the outdoors and for collision boxes of the shell."""
-    free: tuple[str, ...] = ()
-    """Placement ids that have a body and a free joint of the same name."""
 
 
-def compile_scene(
-    house: House,
-    catalogue: Catalogue,
-    *,
-    free: Iterable[str] = (),
-    collisions: bool = True,
-    lit: LitPages | None = None,
-) -> Scene:
+def compile_scene(house: House, catalogue: Catalogue, *, collisions: bool = True, lit: LitPages | None = None) -> Scene:
     """Build and compile `house`.
 
     Args:
-      free: ids of the placements that physics may move; see `loose`.
       collisions: False leaves the collision boxes out, which a renderer does not need.
       lit: draw these pages instead of the house's own materials.
     """
     parts = house_parts(house, catalogue) if lit is None else ()
-    spec = build_spec(house, catalogue, free=frozenset(free), collisions=collisions, lit=lit, parts=parts)
+    spec = build_spec(house, catalogue, collisions=collisions, lit=lit, parts=parts)
     model, names = compile_spec(spec), owners(house)
     del spec
     give_memory_back()
@@ -116,7 +106,7 @@ def compile_scene(
         kind, room = labels.get(owner, ("outdoor", ""))
         kinds.append(kind if model.geom_group[g] == VISUAL else "collision")
         rooms.append(room)
-    return Scene(model, names, owned, tuple(kinds), tuple(rooms), tuple(sorted(free)))
+    return Scene(model, names, owned, tuple(kinds), tuple(rooms))
 
 
 def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
@@ -175,7 +165,8 @@ def build_spec(
     """The house as an MjSpec.
 
     Args:
-      free, collisions, lit: as for `compile_scene`.
+      free: ids of the placements that physics may move; see `loose`.
+      collisions, lit: as for `compile_scene`.
       hinged: doors turn on hinges, and what furniture has moves (embodied.scene.doors, cupboards); fixed without.
       parts: house_parts(house, catalogue) where the caller has them already.
       contents: what lies in closed furniture that is hinged (embodied.generate.contents).

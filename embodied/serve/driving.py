@@ -151,7 +151,7 @@ class EncodedPanoramas:
         """A JPEG of the faces in the order of embodied.render.panorama.FACES."""
         world, node = self._place[name]
         if (house := world.partition(MARK)[0]) == world:
-            faces = self._files[world].rgb(node)
+            faces = self._files[world].read(node).rgb
         else:
             with self._lock:  # one thread at a time may draw
                 faces = place_named({house: self._open(house)}, world).panorama(node).rgb
