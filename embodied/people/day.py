@@ -157,10 +157,12 @@ def day_of(house: House, catalogue: Catalogue, *, seed: int) -> Day:
     ages = {f"adult_{k + 1}": 40 for k in range(home.adults)}
     ages |= {f"child_{k + 1}": age for k, age in enumerate(home.children)}
     everybody = [*people().values()]
+    figured = {p.asset.removeprefix("people/").partition("_")[0] for p in house.placements}  # who stands about
     left, figures = [everybody[i] for i in rng.permutation(len(everybody))], dict[str, Person]()
     for name, age in ages.items():
         family = next(iter(figures.values()), left[0]).family
         unlike = [max(abs(p.age - age), 3 if age < 18 else 20) + 5 * (p.family != family) for p in left]
+        unlike = [u + 100 * (p.id in figured or (p.age < 18) != (age < 18)) for u, p in zip(unlike, left)]
         figures[name] = left.pop(int(np.argmin(unlike)))
     planner, wishes = _Planner(house, catalogue, figures, seed), []
     for name in ages:
