@@ -17,7 +17,17 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.cli import main
 from embodied.datasets.vqa.build import VqaData, asked_about
 from embodied.datasets.vqa.scene import WalkScene
-from embodied.datasets.vqa.scoring import BLIND, LETTERS, VqaQuestion, accuracy, chance, cross_judged, score, thinned
+from embodied.datasets.vqa.scoring import (
+    BLIND,
+    LETTERS,
+    VqaQuestion,
+    accuracy,
+    chance,
+    cross_judged,
+    less_guessed,
+    score,
+    thinned,
+)
 from embodied.datasets.vqa.types import TYPES
 from embodied.datasets.vqa.walks import CLEAR_SHARE, Walk, WalkFrame
 from embodied.house.house import House, Placement
@@ -119,13 +129,27 @@ def test_questions_that_can_be_guessed_are_thinned_until_they_cannot():
         for k in range(400):
             options = [str(o) for o in rng.permutation(nouns)[:4]]
             right = "bed" if "bed" in options and rng.random() < guessable else options[rng.integers(4)]
-            out.append(VqaQuestion(str(k), "w", "support", "What is there?", right, tuple(options)))
+            walk = f"{'train' if k % 4 else 'test'}_{k // 10:04d}_0"
+            out.append(VqaQuestion(str(k), walk, "support", "What is there?", right, tuple(options)))
         return out
 
     assert max(cross_judged(m, asked(0.9), 5)[0].mean() for m in BLIND) > 0.4
     left = thinned(asked(0.9), 0)
-    assert 50 < len(left) < 380 and max(cross_judged(m, left, 5)[0].mean() for m in BLIND) < 0.33
+    test = [q.walk.startswith("test") for q in left]
+    judged = [cross_judged(m, left, 5)[0] for m in BLIND]
+    assert 50 < len(left) < 380 and max(scores.mean() for scores in judged) < 0.33
+    assert sum(test) > 10 and max(scores[test].mean() for scores in judged) < 0.4
     assert len(thinned(asked(0.0), 0)) > 300
+
+
+def test_no_more_is_left_out_than_a_model_guesses():
+    asked = [VqaQuestion(str(k), "w_0_0", "sun", "Where?", "a", ("a", "b")) for k in range(100)]
+    half, sure = np.arange(100) % 2, np.arange(100.0)
+    assert less_guessed(asked, half, sure) == asked
+    assert less_guessed(asked, np.ones(100), sure) == []
+    most = np.arange(100) < 60
+    kept = [int(q.id) for q in less_guessed(asked, most.astype(float), sure)]
+    assert np.mean(most[kept]) <= 0.53 and 80 < len(kept) < 90 and {*range(60, 100)} <= {*kept}
 
 
 def test_plurals():
@@ -165,7 +189,12 @@ def test_the_command_makes_questions_about_what_the_frames_show(tmp_path, capsys
     assert main(["evaluate", "vqa", "--data", data, "--agent", "judge", "--json"]) == 0
     judged = json.loads(capsys.readouterr().out)["scores"]
     assert judged["judge"] != judged["judge, blind"] and min(judged["judge"]) >= 0
-    assert main(["evaluate", "vqa", "--data", data, "--agent", "judge", "--split", "train"]) == 2
+    assert (
+        main(["evaluate", "vqa", "--data", data, "--agent", "judge", "blind", "--split", "train", "test", "--json"])
+        == 0
+    )
+    both = json.loads(capsys.readouterr().out)["types"]
+    assert "object_rel_distance, train" in both and "object_rel_distance, test" in both
     assert main(["view", data, "--episode", "0"]) == 0
     assert cv2.imread(f"{data}/sheets/0.png").shape[1] == 4 * 480
     for form in ("vsi", "llava", "sat", "openeqa"):

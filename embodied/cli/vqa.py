@@ -62,15 +62,19 @@ def evaluate(args: EvaluateOptions) -> None:
             f"unknown agents {unknown}; questions are answered by llm, judge and blind (models without sight)"
         )
     data = VqaData(args.data)
-    split = args.split[0] if args.split else [*data.about["counts"]][-1]
-    questions = data.questions(split)
+    splits = args.split or [[*data.about["counts"]][-1]]
+    questions = [q for split in splits for q in data.questions(split)]
     questions = questions[:: -(-len(questions) // args.tasks)] if args.tasks else questions
     of = {t: [q for q in questions if q.type == t] for t in dict.fromkeys(q.type for q in questions)}
     columns = {"chance": [chance(qs) for qs in of.values()]}
     if "blind" in (args.agent or ("blind",)):
-        if few := [t for t, qs in of.items() if len(qs) < 2]:
-            raise ValueError(f"blind models learn from half of a type's questions, and {few} have one; raise --tasks")
-        columns |= {m: [float(cross_judged(m, qs, args.seed + 1)[0].mean()) for qs in of.values()] for m in BLIND}
+        every = [q for name in data.about["counts"] for q in data.questions(name)]
+        for model in BLIND:
+            judged_by_id = {}
+            for t in of:
+                known = [q for q in every if q.type == t]
+                judged_by_id |= zip((q.id for q in known), cross_judged(model, known, args.seed + 1)[0].tolist())
+            columns[model] = [sum(judged_by_id[q.id] for q in qs) / len(qs) for qs in of.values()]
     mean_of = lambda scores: [sum(scores[q.id] for q in qs) / len(qs) for qs in of.values()]
     for name, answers in judged(args, data, questions) if "judge" in args.agent else ():
         columns[name] = mean_of({q.id: score(q, a) for q, a in zip(questions, answers, strict=True)})
@@ -85,7 +89,7 @@ def evaluate(args: EvaluateOptions) -> None:
     rows.append(("mean of types", len(questions), [sum(c) / len(c) for c in columns.values()]))
     table = f"| type | n | {' | '.join(columns)} |\n|---|{'---|' * (len(columns) + 1)}\n"
     table += "".join(f"| {t} | {n} | {' | '.join(f'{100 * v:.1f}' for v in values)} |\n" for t, n, values in rows)
-    facts = {"data": data.about["digest"], "split": split, "types": [*of], "scores": columns}
+    facts = {"data": data.about["digest"], "split": splits, "types": [*of], "scores": columns}
     if args.out:
         write_bytes(args.out / "table.md", table.encode())
         write_json(args.out / "table.json", facts, indent=1)

@@ -74,7 +74,9 @@ def build_vqa(config: VqaConfig, folder: Path, cache: Path, *, workers: int = 1,
         for_each_unit(film_house, names, (config, folder, cache), workers=workers, watch=watch)
         for split, n in config.houses.items():
             every[split] = ask(config, scenes_of(folder, split, n, cache), config.questions[split], workers)
-            save_lines(folder / f"questions_{split}.jsonl", every[split])
+        unguessed(config, every, workers)
+        for split, questions in every.items():
+            save_lines(folder / f"questions_{split}.jsonl", questions)
         counts = {split: Counter(q.type for q in questions) for split, questions in every.items()}
         about = {"counts": counts, "digest": digest([to_json(q) for questions in every.values() for q in questions])}
         write_json(folder / "vqa.json", about, indent=1)
@@ -155,14 +157,23 @@ def scenes_of(folder: Path, split: str, houses: int, cache: Path) -> list[WalkSc
 
 
 def ask(config: VqaConfig, scenes: Sequence[WalkScene], wanted: int, workers: int = 1) -> list[VqaQuestion]:
-    """Questions, type by type: as many of each as there are, up to a number that all share."""
-    parallel, most = joblib.Parallel(n_jobs=workers), -(-SPARE * wanted // (len(TYPES) * len(scenes)))
-    parts = parallel(joblib.delayed(asked_about)(s, most, config.seed) for s in scenes)
-    of_type = ([q for part in parts for q in part if q.type == name] for name in TYPES)
-    kept = parallel(joblib.delayed(thinned)(qs, config.seed) for qs in of_type)
-    level = max(n for n in range(max(map(len, kept)) + 1) if sum(min(len(qs), n) for qs in kept) <= wanted)
-    rng = stream(config.seed, "kept", wanted)
-    return [qs[i] for qs in kept for i in sorted(rng.permutation(len(qs))[:level].tolist())]
+    """Many more questions than are wanted."""
+    most = -(-SPARE * wanted // (len(TYPES) * len(scenes)))
+    parts = joblib.Parallel(n_jobs=workers)(joblib.delayed(asked_about)(s, most, config.seed) for s in scenes)
+    return [q for part in parts for q in part]
+
+
+def unguessed(config: VqaConfig, left: dict[str, list[VqaQuestion]], workers: int) -> None:
+    """Leave out what blind models guess that know the questions about other houses; keep as many of each type as there
+    are, up to a number that all types of a split share."""
+    for _ in range(2):  # what is left out may keep models from guessing the rest
+        of_type = [[q for questions in left.values() for q in questions if q.type == name] for name in TYPES]
+        kept = joblib.Parallel(n_jobs=workers)(joblib.delayed(thinned)(qs, config.seed) for qs in of_type)
+        for split in left:
+            own, most = [[q for q in qs if q.walk.startswith(f"{split}_")] for qs in kept], config.questions[split]
+            level = max(n for n in range(max(map(len, own)) + 1) if sum(min(len(qs), n) for qs in own) <= most)
+            rng = stream(config.seed, "kept", split)
+            left[split] = [qs[i] for qs in own for i in sorted(rng.permutation(len(qs))[:level].tolist())]
 
 
 def asked_about(scene: WalkScene, most: int, seed: int) -> list[VqaQuestion]:

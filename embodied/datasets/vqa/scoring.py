@@ -6,6 +6,8 @@ adversarial filtering (Le Bras et al. 2020, "Adversarial Filters of Dataset Bias
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
 import zlib
 from collections import Counter
@@ -22,9 +24,9 @@ LETTERS = "ABCDE"
 NEAR_CHANCE, MOST_ALIKE, FEWEST_LEFT = 0.03, 1 / 2, 12
 """How far above chance a blind model may be; most questions of a type with one number; fewest of a type."""
 BLIND = ("majority", "prior", "classifier")
-"""The letter, the option (the median number), or words, that are right most often; the last is a linear model."""
-HASHED, DAMPING, ROUNDS, DROPPED, HALVINGS = 2**13, 3.0, 30, 0.05, 3
-"""Words told apart and how they are learned; share of questions dropped at a time; ways to halve them, half by half."""
+"""The letter, the option, or the words that are right most often; to numbers, the first two say the usual one."""
+HASHED, DAMPING, ROUNDS, HOUSE_FOLDS = 2**13, 3.0, 30, 5
+"""Words told apart and how they are learned; parts of the houses."""
 
 
 @dataclass(frozen=True)
@@ -79,50 +81,48 @@ def chance(questions: Questions) -> float:
     return max(float(accuracy(guess, true).mean()) for guess in np.unique(true))
 
 
-def blind(model: str, known: Questions, asked: Questions) -> np.ndarray:
-    """(2, n): scores of a model that learned from `known`, and how sure it is of each right answer, for one type."""
-    numbers, ends = not known[0].options, np.cumsum([len(q.options) for q in asked])[:-1]
-    to_learn = [float(np.log(float(q.answer))) for q in known] if numbers else []
-    to_learn += [(o == q.answer) - 1 / len(q.options) for q in known for o in q.options]
-    values = _words(asked) @ lsqr(_words(known), np.subtract(to_learn, np.mean(to_learn)), DAMPING, iter_lim=ROUNDS)[0]
+def cross_judged(model: str, questions: Questions, seed: int) -> np.ndarray:
+    """(2, n): scores of a blind model for questions of one type, having learned from those about other houses, and how
+    sure it is of each right answer."""
+    numbers, of, words = not questions[0].options, folds(questions, seed), _words(model, questions)
+    options = [max(len(q.options), 1) for q in questions]
+    goal = lambda q, o: (o == q.answer) - 1 / len(q.options) if o else math.log(float(q.answer))
+    true = np.array([goal(q, o) for q in questions for o in q.options or ("",)])
+    of_option, values = np.repeat(of, options), np.zeros(len(true))
+    for k in sorted({*of.tolist()}) if len({*of.tolist()}) > 1 else ():
+        known = of_option != k
+        weights = lsqr(words[known], true[known] - true[known].mean(), DAMPING, iter_lim=ROUNDS)[0]
+        values[~known] = true[known].mean() + words[~known] @ weights
     if numbers:
-        answers = np.exp(np.mean(to_learn) + values) if model == "classifier" else np.exp(np.median(to_learn))
-        return np.stack([accuracy(answers, np.array([float(q.answer) for q in asked]))] * 2)
-    if model != "classifier":
-        key = (lambda q, o: q.options.index(o)) if model == "majority" else (lambda q, o: o)
-        offered, right = Counter(key(q, o) for q in known for o in q.options), Counter(key(q, q.answer) for q in known)
-        share = lambda q, o: (right[key(q, o)] + 1) / (offered[key(q, o)] + len(q.options))
-        values = np.array([share(q, o) for q in asked for o in q.options])
+        return np.stack([accuracy(np.exp(values), np.exp(true))] * 2)
     judged = []
-    for q, of_options in zip(asked, np.split(values, ends)):
+    for q, of_options in zip(questions, np.split(values, np.cumsum(options)[:-1])):
         own, others = of_options[q.options.index(q.answer)], np.delete(of_options, q.options.index(q.answer))
         level = int((np.abs(others - own) < 1e-9).sum())
         judged.append(((own >= others.max() - 1e-9) / (1 + level), own - others.max()))
     return np.array(judged).T
 
 
-def _words(questions: Questions) -> csr_array:
-    """(options, HASHED) words of each option with those of its question; (questions, HASHED) where there are none."""
+def folds(questions: Questions, seed: int) -> np.ndarray:
+    """(n,) int: questions about one house are in one part of HOUSE_FOLDS; those about a single house are dealt out."""
+    houses = [q.walk.rpartition("_")[0] for q in questions]
+    names = {name: k for k, name in enumerate(sorted({*houses}))}
+    fold = stream(seed, "folds").permutation(max(len(names), HOUSE_FOLDS)) % HOUSE_FOLDS
+    return np.array([fold[names[h] if len(names) > 1 else k % HOUSE_FOLDS] for k, h in enumerate(houses)])
+
+
+def _words(model: str, questions: Questions) -> csr_array:
+    """(options, HASHED) what a model knows of each option; (questions, HASHED) where there are none."""
     rows = []
     for q in questions:
-        of_question = re.findall(r"[a-z]+", q.text.lower())
+        of_question = re.findall(r"[a-z]+", q.text.lower()) if model == "classifier" else []
         for k, option in enumerate(q.options or ("",)):
-            of_option = [*re.findall(r"[a-z]+", option.lower()), f"={option}", f"{k}."] if option else []
-            words = [*of_option, *(f"{a}|{b}" for a in of_question for b in of_option)] or of_question
+            of_option = [*re.findall(r"[a-z]+", option.lower()), f"={option}", f"{k}."]
+            of_option = {"majority": of_option[-1:], "prior": of_option[-2:-1]}.get(model, of_option)
+            words = [*of_option, *(f"{a}|{b}" for a in of_question for b in of_option)] if option else of_question
             rows.append(sorted({zlib.crc32(w.encode()) % HASHED for w in words}))
     ends = np.cumsum([0, *map(len, rows)])
-    return csr_array((np.ones(ends[-1]), np.concatenate(rows), ends), shape=(len(rows), HASHED))
-
-
-def cross_judged(model: str, questions: Questions, seed: int) -> np.ndarray:
-    """(2, n): `blind` for every question, by models that learned from another half of them, HALVINGS times."""
-    judged = np.zeros((HALVINGS, 2, len(questions)))
-    for i in range(HALVINGS):
-        half = stream(seed, "halves", i).permutation(len(questions)) % 2 == 0
-        for part in (half, ~half):
-            known, asked = ([q for q, is_in in zip(questions, where) if is_in] for where in (~part, part))
-            judged[i][:, part] = blind(model, known, asked)
-    return judged.mean(0)
+    return csr_array((np.ones(ends[-1]), np.array([*itertools.chain(*rows)], int), ends), shape=(len(rows), HASHED))
 
 
 def balanced(questions: Questions, seed: int) -> list[VqaQuestion]:
@@ -137,14 +137,25 @@ def balanced(questions: Questions, seed: int) -> list[VqaQuestion]:
     return [q for q in questions if q.id in kept]
 
 
+def less_guessed(questions: Questions, scores: np.ndarray, sure: np.ndarray) -> list[VqaQuestion]:
+    """Questions of one type without those that a model is surest of: as many as bring it near chance in the split where
+    it is farthest above."""
+    splits = np.array([q.walk.partition("_")[0] for q in questions])
+    parts = [np.flatnonzero(splits == name) for name in sorted({*splits.tolist()})]
+    levels = [chance([questions[k] for k in part.tolist()]) + NEAR_CHANCE for part in parts]
+    above, k = max((float(scores[part].mean()) - level, k) for k, (part, level) in enumerate(zip(parts, levels)))
+    likely = parts[k][scores[parts[k]] >= scores[parts[k]].mean()]
+    most = max(0, math.ceil(above * len(parts[k]) / max(1 - levels[k], NEAR_CHANCE)))
+    drop = {*likely[np.argsort(-sure[likely], kind="stable")[:most]].tolist()}
+    return [q for i, q in enumerate(questions) if i not in drop]
+
+
 def thinned(questions: Questions, seed: int) -> list[VqaQuestion]:
-    """The questions of one type without those that blind models are surest of, until all are near chance."""
-    left = balanced(questions, seed)
-    while len(left) >= FEWEST_LEFT:
-        scores, sure = max((cross_judged(m, left, seed + len(left)) for m in BLIND), key=lambda j: j[0].mean())
-        if scores.mean() <= chance(left) + NEAR_CHANCE:
-            return left
-        likely = np.flatnonzero(scores >= scores.mean())
-        drop = {*likely[np.argsort(-sure[likely], kind="stable")[: max(1, round(DROPPED * len(left)))]].tolist()}
-        left = [q for k, q in enumerate(left) if k not in drop]
-    return []
+    """The questions of one type, of all splits, without those that blind models are surest of, until all are near
+    chance in every split."""
+    before, left = 0, balanced(questions, seed)
+    while FEWEST_LEFT <= len(left) != before:
+        before = len(left)
+        judged = [cross_judged(m, left, seed + len(left)) for m in BLIND]
+        left = min((less_guessed(left, *of_model) for of_model in judged), key=len)
+    return left if len(left) >= FEWEST_LEFT else []
