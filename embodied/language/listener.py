@@ -16,25 +16,7 @@ from dataclasses import dataclass
 
 from embodied.geometry import wrap
 from embodied.interface import SeenPlace
-from embodied.language.clauses import (
-    LEFT,
-    REMARKS,
-    STOPS,
-    Clause,
-    Climb,
-    Cross,
-    Enter,
-    Exit,
-    Metres,
-    OpenDoor,
-    Past,
-    Referent,
-    RouteInstruction,
-    StopBy,
-    StopIn,
-    To,
-    Turn,
-)
+from embodied.language import clauses as meaning
 from embodied.language.grammar import parse
 from embodied.language.lexicon import lexicon_of
 from embodied.language.surroundings import Lookout, Surroundings, Way, doorway
@@ -69,7 +51,7 @@ def follow(world: SeenPlace, text: str, start: int, yaw: float) -> Execution:
     return carry_out(Lookout(world), parse(text, lexicon_of(world.catalogue)), start, yaw)
 
 
-def carry_out(eyes: Lookout, instruction: RouteInstruction, start: int, yaw: float) -> Execution:
+def carry_out(eyes: Lookout, instruction: meaning.RouteInstruction, start: int, yaw: float) -> Execution:
     """The cheapest walk that fits the clauses, found by uniform-cost search."""
     clauses = runnable(instruction.clauses)
     tie = itertools.count()
@@ -121,49 +103,59 @@ class _Walk:
         return dataclasses.replace(self, clause=self.clause + 1, begun=len(self.path) - 1, pending=pending)
 
 
-def runnable(clauses: Sequence[Clause]) -> tuple[Clause, ...]:
+def runnable(clauses: Sequence[meaning.Clause]) -> tuple[meaning.Clause, ...]:
     """Without remarks, and without turns at the end that nothing follows."""
-    kept = [c for c in clauses if not isinstance(c, REMARKS)]
-    while len(kept) > 1 and isinstance(kept[-1], Turn):
+    kept = [c for c in clauses if not isinstance(c, meaning.REMARKS)]
+    while len(kept) > 1 and isinstance(kept[-1], meaning.Turn):
         kept.pop()
     return tuple(kept)
 
 
-def _onward(eyes: Lookout, clause: Clause, walk: _Walk) -> Iterator[tuple[float, _Walk]]:
+def _onward(eyes: Lookout, clause: meaning.Clause, walk: _Walk) -> Iterator[tuple[float, _Walk]]:
     """All ways to go on, with what they cost: finish this clause, or take a step within it."""
     path, steps, pending = walk.path, walk.steps, walk.pending
-    if isinstance(clause, Turn):
-        turned = math.radians(clause.angle) * (1 if clause.side == LEFT else -1)
+    if isinstance(clause, meaning.Turn):
+        turned = math.radians(clause.angle) * (1 if clause.side == meaning.LEFT else -1)
         yield 0.0, walk.next_clause(pending + turned)
         return
-    if isinstance(clause, STOPS):
+    if isinstance(clause, meaning.STOPS):
         yield stop_cost(clause, eyes.at(path[-1])), walk.next_clause(pending)
         return
     if steps:
         yield walk_cost(clause, eyes, path[walk.begun :]) + count_cost(clause, eyes, path), walk.next_clause(0.0)
-    elif isinstance(clause, To | Past):
+    elif isinstance(clause, meaning.To | meaning.Past):
         yield 0.8 + walk_cost(clause, eyes, path[walk.begun :]), walk.next_clause(pending)
     if steps < STEPS_PER_CLAUSE:
         for way in eyes.at(path[-1]).ways:
             added = _step_cost(clause, way, walk) + 1.5 * (way.node in path)
-            if isinstance(clause, Climb):
+            if isinstance(clause, meaning.Climb):
                 added = 0.12 + (0.0 if steps else added) + MISSING * (way.climb not in (None, clause.way))
             elif way.climb is not None:
                 added += UNASKED
-            if way.leaves and not isinstance(clause, Exit | Enter | OpenDoor | Climb):
-                added += 0.4 * (not isinstance(clause, Cross))
-            if way.closed and not isinstance(clause, OpenDoor):
+            if way.leaves and not isinstance(clause, meaning.Exit | meaning.Enter | meaning.OpenDoor | meaning.Climb):
+                added += 0.4 * (not isinstance(clause, meaning.Cross))
+            if way.closed and not isinstance(clause, meaning.OpenDoor):
                 added += UNASKED
             left = 0.0 if steps else pending
             yield added, dataclasses.replace(walk, path=(*path, way.node), facing=way.yaw, pending=left)
 
 
-def _step_cost(clause: Clause, way: Way, walk: _Walk) -> float:
+def _step_cost(clause: meaning.Clause, way: Way, walk: _Walk) -> float:
     """Of one step in itself: turns that were not asked for, but for the one into a counted door."""
     turned = float(wrap(way.yaw - walk.facing))
-    if way.leaves and isinstance(clause, Enter) and clause.nth and (turned > 0) == (clause.side == LEFT):
+    if (
+        way.leaves
+        and isinstance(clause, meaning.Enter)
+        and clause.nth
+        and (turned > 0) == (clause.side == meaning.LEFT)
+    ):
         return 0.12
-    if way.closed and isinstance(clause, OpenDoor) and clause.side and (turned > 0) == (clause.side == LEFT):
+    if (
+        way.closed
+        and isinstance(clause, meaning.OpenDoor)
+        and clause.side
+        and (turned > 0) == (clause.side == meaning.LEFT)
+    ):
         return 0.12
     wanted = walk.pending if walk.steps == 0 else 0.0
     return 0.12 + turn_cost(turned, wanted, asked=walk.steps == 0 and walk.pending != 0.0)
@@ -176,46 +168,46 @@ def turn_cost(turned: float, wanted: float, *, asked: bool) -> float:
     return min(max(off - free, 0.0) / scale, 2.5) ** 2
 
 
-def walk_cost(clause: Clause, eyes: Lookout, path: Sequence[int]) -> float:
+def walk_cost(clause: meaning.Clause, eyes: Lookout, path: Sequence[int]) -> float:
     """How badly a stretch of walk (its start included) fits one clause."""
     first, last = eyes.at(path[0]), eyes.at(path[-1])
     crossings = [_way(eyes.at(a), b).leaves for a, b in itertools.pairwise(path)]
-    if isinstance(clause, Exit):
+    if isinstance(clause, meaning.Exit):
         return MISSING * (first.kind != clause.kind) + MISSING * (not any(crossings)) + 1.0 * (sum(crossings) > 1)
-    if isinstance(clause, Enter):
+    if isinstance(clause, meaning.Enter):
         return (
             MISSING * (last.kind != clause.kind)
             + MISSING * (not (crossings and crossings[-1]))
             + 0.8 * (sum(crossings) > 1)
         )
-    if isinstance(clause, OpenDoor):
+    if isinstance(clause, meaning.OpenDoor):
         opened = [_way(eyes.at(a), b).closed for a, b in itertools.pairwise(path)]
         return MISSING * (last.kind != clause.kind) + MISSING * (opened[-1:] != [True]) + 0.8 * (sum(crossings) > 1)
-    if isinstance(clause, Climb):
+    if isinstance(clause, meaning.Climb):
         climbed = any(_way(eyes.at(a), b).climb == clause.way for a, b in itertools.pairwise(path))
         return MISSING * (not climbed) + MISSING * (last.on_stairs != clause.half)
-    if isinstance(clause, Cross):
+    if isinstance(clause, meaning.Cross):
         kinds = [eyes.at(n).kind for n in path]
         return 1.5 * (clause.kind not in kinds) + 0.7 * sum(k != clause.kind for k in kinds[1:])
-    if isinstance(clause, Metres):
+    if isinstance(clause, meaning.Metres):
         length = sum(_way(eyes.at(a), b).length for a, b in itertools.pairwise(path))
         return 0.9 * max(abs(length - clause.count) - 0.5, 0.0)
-    if isinstance(clause, To):
+    if isinstance(clause, meaning.To):
         return near_cost(last, clause.thing)
-    if isinstance(clause, Past):
+    if isinstance(clause, meaning.Past):
         return past_cost(clause, eyes, path)
     return 0.0
 
 
-def count_cost(clause: Clause, eyes: Lookout, path: Sequence[int]) -> float:
+def count_cost(clause: meaning.Clause, eyes: Lookout, path: Sequence[int]) -> float:
     """How badly the doorway of the last step fits 'the second door on your left'; `path` begins before the clause."""
-    if not isinstance(clause, Enter) or not clause.nth:
+    if not isinstance(clause, meaning.Enter) or not clause.nth:
         return 0.0
     door = doorway(eyes, path)
     return 2.0 if door is None or door[0] != clause.side else min(1.2 * abs(door[1] - clause.nth), 2.0)
 
 
-def near_cost(seen: Surroundings, thing: Referent) -> float:
+def near_cost(seen: Surroundings, thing: meaning.Referent) -> float:
     """How far one is from being at a thing."""
     nearest = seen.nearest(thing)
     if nearest is None:
@@ -223,7 +215,7 @@ def near_cost(seen: Surroundings, thing: Referent) -> float:
     return min(1.3 * max(nearest.distance - ARRIVAL_DISTANCE, 0.0) + 0.15 * nearest.distance, MISSING)
 
 
-def past_cost(clause: Past, eyes: Lookout, path: Sequence[int]) -> float:
+def past_cost(clause: meaning.Past, eyes: Lookout, path: Sequence[int]) -> float:
     """How badly a stretch passes a thing: it should come near, on the right side."""
     best = MISSING
     for a, b in itertools.pairwise(path):
@@ -233,16 +225,18 @@ def past_cost(clause: Past, eyes: Lookout, path: Sequence[int]) -> float:
             if nearest is None:
                 continue
             bearing = float(wrap(nearest.yaw - ahead))
-            wrong = clause.side is not None and (bearing > 0) != (clause.side == LEFT) and 0.2 < abs(bearing) < 2.9
+            wrong = (
+                clause.side is not None and (bearing > 0) != (clause.side == meaning.LEFT) and 0.2 < abs(bearing) < 2.9
+            )
             best = min(best, max(nearest.distance - PASSING_DISTANCE, 0.0) + 2.0 * wrong)
     return best
 
 
-def stop_cost(clause: Clause, seen: Surroundings) -> float:
+def stop_cost(clause: meaning.Clause, seen: Surroundings) -> float:
     """How badly a node fits where one is told to stop."""
-    if isinstance(clause, StopBy):
+    if isinstance(clause, meaning.StopBy):
         return near_cost(seen, clause.thing)
-    if isinstance(clause, StopIn):
+    if isinstance(clause, meaning.StopIn):
         return MISSING * (seen.kind != clause.kind)
     return 0.0
 

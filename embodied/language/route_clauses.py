@@ -11,29 +11,7 @@ import numpy as np
 
 from embodied.geometry import wrap
 from embodied.interface import SeenPlace
-from embodied.language.clauses import (
-    DOWN,
-    LEFT,
-    RIGHT,
-    STOPS,
-    UP,
-    Avoid,
-    Climb,
-    Cross,
-    Enter,
-    Exit,
-    Forward,
-    Metres,
-    Notice,
-    OpenDoor,
-    Past,
-    Referent,
-    StopBy,
-    StopHere,
-    StopIn,
-    To,
-    Turn,
-)
+from embodied.language import clauses as meaning
 from embodied.language.grammar import Phrase
 from embodied.language.lexicon import PASSAGES, Lexicon, Word, lexicon_of, says
 from embodied.language.listener import ARRIVAL_DISTANCE, PASSING_DISTANCE
@@ -74,7 +52,7 @@ def legs_of(world: SeenPlace, path: Sequence[int], yaw: float) -> list[Leg]:
             nodes.append(b)
             stairs, facing = stairs + float(step[2]), direction
             if not is_on_stairs(world, b) or b == path[-1]:
-                legs.append(Leg(tuple(nodes), turned, False, UP if stairs > 0 else DOWN))
+                legs.append(Leg(tuple(nodes), turned, False, meaning.UP if stairs > 0 else meaning.DOWN))
                 nodes, stairs = [], 0.0
             continue
         turn = float(wrap(direction - facing))
@@ -126,24 +104,24 @@ def plan(
             beside = len(leg.nodes) == 2 and SLIGHT <= abs(leg.turn) < BACK
             if beside:
                 phrases.pop()
-            side = (LEFT if leg.turn > 0 else RIGHT) if beside else None
-            phrases.append(Phrase(OpenDoor(telling.kind(leg.nodes[-1]), side)))
+            side = (meaning.LEFT if leg.turn > 0 else meaning.RIGHT) if beside else None
+            phrases.append(Phrase(meaning.OpenDoor(telling.kind(leg.nodes[-1]), side)))
         elif leg.crosses:
             crossing = _crossing(telling, leg, first=n == 0)
             walked = [*itertools.chain.from_iterable(earlier.nodes[:-1] for earlier in legs[:n]), *leg.nodes]
             if telling.chance(speaker.counts) and (counted := _counted(telling.eyes, walked, crossing)):
-                while phrases and isinstance(phrases[-1].clause, Turn) and phrases[-1].clause.angle != 180:
+                while phrases and isinstance(phrases[-1].clause, meaning.Turn) and phrases[-1].clause.angle != 180:
                     phrases.pop()
                 crossing = counted
             phrases += crossing
         elif leg.climb is not None:
-            phrases.append(Phrase(Climb(leg.climb, is_on_stairs(world, leg.nodes[-1]))))
+            phrases.append(Phrase(meaning.Climb(leg.climb, is_on_stairs(world, leg.nodes[-1]))))
         else:
             phrases.append(_within_a_room(telling, leg, last=n + 1 == len(legs)))
     if telling.chance(speaker.remarks) and (remark := _remark(telling, path)) is not None:
         phrases.append(remark)
     if telling.chance(speaker.avoids) and (wrong := _wrong_room(telling, path)):
-        phrases.append(Phrase(Avoid(wrong)))
+        phrases.append(Phrase(meaning.Avoid(wrong)))
     phrases.append(_stop(telling, path, legs[-1].crosses if legs else False, phrases))
     return phrases
 
@@ -156,9 +134,9 @@ def _within_a_room(telling: _Telling, leg: Leg, *, last: bool) -> Phrase:
     if telling.chance(telling.speaker.metres) or last:
         graph = telling.world.graph
         length = float(sum(graph.distance[a, b] for a, b in itertools.pairwise(leg.nodes)))
-        return Phrase(Metres(max(round(length), 1)))
+        return Phrase(meaning.Metres(max(round(length), 1)))
     here = telling.kind(leg.nodes[0])
-    return Phrase(Cross(here)) if here in PASSAGES and telling.chance(0.5) else Phrase(Forward())
+    return Phrase(meaning.Cross(here)) if here in PASSAGES and telling.chance(0.5) else Phrase(meaning.Forward())
 
 
 def shortened(phrases: Sequence[Phrase], clauses: int) -> list[Phrase]:
@@ -172,33 +150,40 @@ def shortened(phrases: Sequence[Phrase], clauses: int) -> list[Phrase]:
         for i in range(len(kept) - 2, 0, -1):
             if len(kept) <= clauses:
                 return kept
-            between_turns = isinstance(kept[i - 1].clause, Turn) and isinstance(kept[i + 1].clause, Turn)
+            between_turns = isinstance(kept[i - 1].clause, meaning.Turn) and isinstance(
+                kept[i + 1].clause, meaning.Turn
+            )
             if not between_turns and _DROPPABLE[rank](kept[i].clause, kept[i + 1].clause):
                 del kept[i]
     return kept
 
 
 _DROPPABLE = (
-    lambda c, after: isinstance(c, Turn) and c.angle == 45,
-    lambda c, after: isinstance(c, Forward | Metres),
-    lambda c, after: isinstance(c, Cross),
+    lambda c, after: isinstance(c, meaning.Turn) and c.angle == 45,
+    lambda c, after: isinstance(c, meaning.Forward | meaning.Metres),
+    lambda c, after: isinstance(c, meaning.Cross),
     lambda c, after: (
-        isinstance(c, Turn) and c.angle == 90 and isinstance(after, Enter | To) and not getattr(after, "nth", 0)
+        isinstance(c, meaning.Turn)
+        and c.angle == 90
+        and isinstance(after, meaning.Enter | meaning.To)
+        and not getattr(after, "nth", 0)
     ),
-    lambda c, after: isinstance(c, Past),
-    lambda c, after: isinstance(c, Enter) and c.kind in PASSAGES and not c.nth and not isinstance(after, STOPS),
-    lambda c, after: isinstance(c, To) and not isinstance(after, STOPS),
+    lambda c, after: isinstance(c, meaning.Past),
+    lambda c, after: (
+        isinstance(c, meaning.Enter) and c.kind in PASSAGES and not c.nth and not isinstance(after, meaning.STOPS)
+    ),
+    lambda c, after: isinstance(c, meaning.To) and not isinstance(after, meaning.STOPS),
 )
 """Clauses that may be left out before what follows it, the most dispensable first."""
 
 
 def _turn(angle: float) -> list[Phrase]:
-    side = LEFT if angle > 0 else RIGHT
+    side = meaning.LEFT if angle > 0 else meaning.RIGHT
     if abs(angle) >= BACK:
-        return [Phrase(Turn(LEFT, 180))]
+        return [Phrase(meaning.Turn(meaning.LEFT, 180))]
     if abs(angle) >= SHARP:
-        return [Phrase(Turn(side))]
-    return [Phrase(Turn(side, 45))] if abs(angle) >= SLIGHT else []
+        return [Phrase(meaning.Turn(side))]
+    return [Phrase(meaning.Turn(side, 45))] if abs(angle) >= SLIGHT else []
 
 
 def _crossing(telling: _Telling, leg: Leg, *, first: bool) -> list[Phrase]:
@@ -208,17 +193,22 @@ def _crossing(telling: _Telling, leg: Leg, *, first: bool) -> list[Phrase]:
     if len(leg.nodes) > 2 and telling.chance(0.6 * telling.speaker.landmarks):
         phrases = _passing(telling, leg.nodes[:-1])
     if first and here not in PASSAGES and there in PASSAGES and telling.chance(0.7):
-        return [*phrases, Phrase(Exit(here))]
-    return [*phrases, Phrase(Enter(there))]
+        return [*phrases, Phrase(meaning.Exit(here))]
+    return [*phrases, Phrase(meaning.Enter(there))]
 
 
 def _counted(eyes: Lookout, walked: Sequence[int], crossing: list[Phrase]) -> list[Phrase]:
     """The crossing by 'the second door on the left', where there is more than one to choose from; else nothing."""
     door = doorway(eyes, walked)
-    if door is None or door[2] < 2 or door[1] >= len(SPOKEN.ordinals) or not isinstance(crossing[-1].clause, Enter):
+    if (
+        door is None
+        or door[2] < 2
+        or door[1] >= len(SPOKEN.ordinals)
+        or not isinstance(crossing[-1].clause, meaning.Enter)
+    ):
         return []
     side, nth, _ = door
-    return [Phrase(Enter(crossing[-1].clause.kind, side, nth))]
+    return [Phrase(meaning.Enter(crossing[-1].clause.kind, side, nth))]
 
 
 def _mark(telling: _Telling, leg: Leg, *, needed: bool) -> Phrase | None:
@@ -241,7 +231,7 @@ def _mark(telling: _Telling, leg: Leg, *, needed: bool) -> Phrase | None:
     for thing in _ranked(good, telling.rng):
         if (word := _name(telling, thing, start)) is not None:
             used.add(thing.placement)
-            return Phrase(To(telling.lexicon.thing(word)), word)
+            return Phrase(meaning.To(telling.lexicon.thing(word)), word)
     passing = _passing(telling, leg.nodes)
     return passing[0] if passing else None
 
@@ -260,22 +250,22 @@ def _passing(telling: _Telling, nodes: Sequence[int]) -> list[Phrase]:
                 and math.radians(40) < abs(bearing) < math.radians(150)
                 and t.placement not in used
             ):
-                beside.setdefault(t.placement, (t, LEFT if bearing > 0 else RIGHT, eyes.at(a)))
+                beside.setdefault(t.placement, (t, meaning.LEFT if bearing > 0 else meaning.RIGHT, eyes.at(a)))
     for thing in _ranked([t for t, _, _ in beside.values()], telling.rng):
         _, side, before = beside[thing.placement]
-        if before.nearest(Referent((thing.asset.object_class,))) is None:
+        if before.nearest(meaning.Referent((thing.asset.object_class,))) is None:
             continue
         if (word := _name(telling, thing, before)) is not None:
             used.add(thing.placement)
-            return [Phrase(Past(telling.lexicon.thing(word), side if telling.chance(0.6) else None), word)]
+            return [Phrase(meaning.Past(telling.lexicon.thing(word), side if telling.chance(0.6) else None), word)]
     return []
 
 
 def _stop(telling: _Telling, path: Sequence[int], crossed: bool, phrases: Sequence[Phrase]) -> Phrase:
     """The end: by something near the end that can be seen before, else in the room, else here."""
     last = phrases[-1].clause if phrases else None
-    if isinstance(last, To) and telling.chance(0.7):
-        return Phrase(StopHere())
+    if isinstance(last, meaning.To) and telling.chance(0.7):
+        return Phrase(meaning.StopHere())
     end = telling.eyes.at(path[-1])
     before = {t.placement for n in path[-3:-1] for t in telling.eyes.at(n).things}
     near = [t for t in end.things if t.distance <= ARRIVAL_DISTANCE]
@@ -283,9 +273,13 @@ def _stop(telling: _Telling, path: Sequence[int], crossed: bool, phrases: Sequen
         for thing in _ranked(pool, telling.rng):
             if (word := _name(telling, thing, end)) is not None:
                 telling.used.add(thing.placement)
-                return Phrase(StopBy(telling.lexicon.thing(word)), word)
+                return Phrase(meaning.StopBy(telling.lexicon.thing(word)), word)
     # nobody says 'enter the hall and stop in the hall'
-    return Phrase(StopIn(end.kind)) if crossed and not isinstance(last, Enter) else Phrase(StopHere())
+    return (
+        Phrase(meaning.StopIn(end.kind))
+        if crossed and not isinstance(last, meaning.Enter)
+        else Phrase(meaning.StopHere())
+    )
 
 
 def _name(telling: _Telling, thing: VisibleThing, view: Surroundings) -> Word | None:
@@ -328,7 +322,7 @@ def _remark(telling: _Telling, path: Sequence[int]) -> Phrase | None:
     asset = things[int(rng.integers(len(things)))].asset
     speaker, few = telling.speaker, int(rng.integers(2))
     word = telling.lexicon.words_for(asset, rng, adjectives=few, ornament=speaker.ornament, novelty=speaker.novelty)
-    return Phrase(Notice(telling.lexicon.thing(word)), word)
+    return Phrase(meaning.Notice(telling.lexicon.thing(word)), word)
 
 
 def _wrong_room(telling: _Telling, path: Sequence[int]) -> str | None:
