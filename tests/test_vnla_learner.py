@@ -17,8 +17,18 @@ from embodied.agents.common.imitation import play_with_memory
 from embodied.agents.common.weights import CheckpointError
 from embodied.agents.learners.vnla import RULES
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vnla.looking import READING, lessons_of, turned
-from embodied.agents.vnla.network import ASK, DONT, MOST_LEFT, NO_ASK, NO_MOVE, STOP, VnlaPercept
+from embodied.agents.vnla.network import (
+    ASK,
+    DONT,
+    MOST_LEFT,
+    NO_ASK,
+    NO_MOVE,
+    READING,
+    STOP,
+    VnlaPercept,
+    lessons_of,
+    turned,
+)
 from embodied.agents.vnla.policy import VnlaMoment, _decided, carried_out, for_training
 from embodied.agents.vnla.study import ASKED, LEARNED, TEACHER, VnlaAgent, VnlaLearner, losses_of
 from embodied.assets.records import ROOM_KINDS

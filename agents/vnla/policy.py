@@ -22,8 +22,7 @@ from embodied.agents.common.tensors import Chooser, RunningRows, choose_greedily
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.find.policy import WORDS as REQUEST
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vnla.looking import READ, turned
-from embodied.agents.vnla.network import ASK, DONT, MOST_LEFT, NO_ASK, NO_MOVE, STOP, ReadText, VnlaNetwork, VnlaPercept
+from embodied.agents.vnla import network as networks
 from embodied.interface import (
     TURNS,
     Actions,
@@ -67,7 +66,7 @@ class VnlaMemory(RunningRows):
 
     state: Tensor
     """(k, 2, h) of the decoder."""
-    text: ReadText
+    text: networks.ReadText
     previous_move: Tensor
     """(k,) int64."""
     previous_ask: Tensor
@@ -88,7 +87,7 @@ class VnlaMemory(RunningRows):
 class VnlaPolicy:
     """A trained (or training) network that acts, and asks by a rule that needs no privilege."""
 
-    network: VnlaNetwork
+    network: networks.VnlaNetwork
     vocabulary: Vocabulary
     bank: FeatureBank
     asker: str = "learned"
@@ -145,13 +144,13 @@ class VnlaPolicy:
             if teacher is None:
                 chance = _decided(chance, None if memory.before[row] is None else int(memory.previous_move[row]))
             number, thought = self.choose(chance, rngs[place]), Thought(chance, asked)
-            actions[place] = Stop(thought) if number == STOP else Move(number, thought)
+            actions[place] = Stop(thought) if number == networks.STOP else Move(number, thought)
         if teacher is not None:
             moment = _moment(teacher, now, thoughts, asks, able, moves, acting)
             memory = dataclasses.replace(memory, moments=(*memory.moments, moment))
         rows_asking = torch.tensor(asking, dtype=torch.long, device=moves.device)
         before = tuple(None if row in asking else o for row, o in enumerate(seen))  # who moved will see what came of it
-        previous_ask = memory.previous_ask.index_fill(0, rows_asking, ASK)
+        previous_ask = memory.previous_ask.index_fill(0, rows_asking, networks.ASK)
         return actions, dataclasses.replace(memory, previous_ask=previous_ask, before=before)
 
     def _wants(
@@ -177,12 +176,12 @@ class VnlaPolicy:
             positions=positions,
             state=torch.zeros(k, 2, self.network.hidden_size, device=device),
             text=self.network.blank(k),
-            previous_move=torch.full((k,), NO_MOVE, device=device),
-            previous_ask=torch.full((k,), NO_ASK, device=device),
+            previous_move=torch.full((k,), networks.NO_MOVE, device=device),
+            previous_ask=torch.full((k,), networks.NO_ASK, device=device),
             before=(None,) * k,
             times=tuple(drawn),
             request=torch.from_numpy(self.vocabulary.batch([o.instruction for o in seen], REQUEST)).to(device),
-            read=torch.zeros(k, READ, device=device),
+            read=torch.zeros(k, networks.READ, device=device),
             came=torch.full((k,), -1, device=device),
         )
 
@@ -209,13 +208,13 @@ class VnlaPolicy:
         previous = torch.tensor(done, device=device)
         return dataclasses.replace(memory, text=text, previous_move=previous, read=read, came=came)
 
-    def _percept(self, memory: VnlaMemory, seen: Sequence[Observation]) -> VnlaPercept:
+    def _percept(self, memory: VnlaMemory, seen: Sequence[Observation]) -> networks.VnlaPercept:
         device = memory.previous_move.device
         turns = torch.tensor([o.turn for o in seen], device=device)
         allowed = torch.from_numpy(np.stack([o.candidates.allowed for o in seen])).to(device)
-        left = [MOST_LEFT if o.requests_left is None else o.requests_left for o in seen]
-        return VnlaPercept(
-            reading=turned(memory.read, turns, memory.came, allowed[:, 0]),
+        left = [networks.MOST_LEFT if o.requests_left is None else o.requests_left for o in seen]
+        return networks.VnlaPercept(
+            reading=networks.turned(memory.read, turns, memory.came, allowed[:, 0]),
             previous_move=memory.previous_move,
             previous_ask=memory.previous_ask,
             left=torch.tensor(left, device=device),
@@ -223,7 +222,7 @@ class VnlaPolicy:
         )
 
     def _consider(
-        self, memory: VnlaMemory, percept: VnlaPercept, rows: Sequence[int]
+        self, memory: VnlaMemory, percept: networks.VnlaPercept, rows: Sequence[int]
     ) -> tuple[dict[int, Thought], Tensor]:
         """The first pass: what each of `rows` was about to do and whether it would ask, and logits (m, 2)."""
         if not rows:
@@ -233,7 +232,7 @@ class VnlaPolicy:
             index = torch.tensor(rows, device=percept.reading.device)
             percept, state, text = percept.select(index), state[index], text.select(index)
         moves, asks = self.network.consider(percept, state, text)
-        chances, help_ = moves.cpu().numpy(), asks.detach().softmax(-1)[:, ASK].tolist()
+        chances, help_ = moves.cpu().numpy(), asks.detach().softmax(-1)[:, networks.ASK].tolist()
         thoughts = {
             row: Thought(chance, {"help": h, "nothing": 1 - h})
             for row, chance, h in zip(rows, chances, help_, strict=True)
@@ -241,17 +240,17 @@ class VnlaPolicy:
         return thoughts, asks
 
     def _navigate(
-        self, memory: VnlaMemory, percept: VnlaPercept, seen: Sequence[Observation], rows: Sequence[int]
+        self, memory: VnlaMemory, percept: networks.VnlaPercept, seen: Sequence[Observation], rows: Sequence[int]
     ) -> tuple[VnlaMemory, Tensor]:
         """The second pass: memory after it and logits (n, 6)."""
         if not rows:
-            return memory, percept.reading.new_zeros(0, STOP + 1)
+            return memory, percept.reading.new_zeros(0, networks.STOP + 1)
         device = percept.reading.device
         index = torch.tensor(rows, device=device)
         acts = torch.zeros(len(seen), dtype=torch.bool, device=device).index_fill(0, index, True)
         just_asked = [b is None and not o.can_ask for b, o in zip(memory.before, seen, strict=True)]
-        just_told = torch.tensor(just_asked, device=device) & (percept.previous_ask == ASK)
-        asked = torch.where(acts, torch.where(just_told, ASK, DONT), percept.previous_ask)
+        just_told = torch.tensor(just_asked, device=device) & (percept.previous_ask == networks.ASK)
+        asked = torch.where(acts, torch.where(just_told, networks.ASK, networks.DONT), percept.previous_ask)
         now = dataclasses.replace(percept, previous_ask=asked)
         moves, state, _ = self.network.navigate(now, memory.state, memory.text)
         state = state.where(acts[:, None, None], memory.state)  # who asks acts later
@@ -271,7 +270,7 @@ def carried_out(before: Observation, now: Observation) -> int:
         return WORDS.index("left" if (now.turn - before.turn) % TURNS == 1 else "right")
     if now.tilt != before.tilt:
         return WORDS.index("up" if now.tilt > before.tilt else "down")
-    return STOP
+    return networks.STOP
 
 
 def _arrived(s: Situation) -> bool:
@@ -286,8 +285,8 @@ def _decided(chances: np.ndarray, previous: int | None) -> np.ndarray:
     kept = chances.copy()
     if previous in UNDOES:
         kept[UNDOES[previous]] = 0
-    if chances[STOP] < SURE:
-        kept[STOP] = 0
+    if chances[networks.STOP] < SURE:
+        kept[networks.STOP] = 0
     return kept / kept.sum() if kept.any() else chances
 
 
@@ -305,7 +304,7 @@ def _moment(
     assert len(there) == len(situations), "a teacher sees situations"
     wished = [int(ask_reason(there[row], thoughts[row]) is not None) for row in able]
     wanted = [
-        STOP if _arrived(s := there[row]) or isinstance(a := teacher.reference(s), Stop) else a.candidate
+        networks.STOP if _arrived(s := there[row]) or isinstance(a := teacher.reference(s), Stop) else a.candidate
         for row in acting
     ]
     whole = functools.partial(torch.tensor, dtype=torch.long, device=moves.device)

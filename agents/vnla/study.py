@@ -34,8 +34,7 @@ from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import study_tables
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import SightedStudy, Split, TrainingData
-from embodied.agents.vnla.looking import lessons_of, reading_loss
-from embodied.agents.vnla.network import VnlaNetwork
+from embodied.agents.vnla.network import VnlaNetwork, lessons_of, reading_loss
 from embodied.agents.vnla.policy import VnlaMoment, VnlaPolicy, for_training
 from embodied.assistants.advisor import HELP_STEPS
 from embodied.datasets.store import Dataset, SplitData
