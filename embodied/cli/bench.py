@@ -39,7 +39,7 @@ class BenchOptions(Furnished, Printed):
 
 def run(args: BenchOptions) -> None:
     from embodied import gl
-    from embodied.bench import light, seen, timing, world
+    from embodied.bench import light, timing, world
 
     parts = args.part or ["houses", "pictures", "plays"]
     if unknown := sorted(set(parts) - set(PARTS)):
@@ -48,10 +48,10 @@ def run(args: BenchOptions) -> None:
     lines = {
         "houses": lambda: world.houses(catalogue, args.seed),
         "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.pictures),
-        "views": lambda: seen.views(catalogue, args.cache, args.seed),
+        "views": lambda: world.views(catalogue, args.cache, args.seed),
         "plays": lambda: world.plays(catalogue, args.seed),
-        "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.pictures),
-        "drive": lambda: seen.drive(catalogue, args.cache, args.seed, args.pictures),
+        "seen": lambda: world.seen(catalogue, args.cache, args.seed, args.pictures),
+        "drive": lambda: world.drive(catalogue, args.cache, args.seed, args.pictures),
         "bakes": lambda: world.bakes(catalogue, args.cache, args.seed),
     }
     measures = []
