@@ -20,10 +20,11 @@ from torch import Tensor
 from embodied.agents.common.tensors import Chooser, choose_greedily, padded
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.find.network import SeekNetwork
-from embodied.agents.hanna.topological_map import SAME_PLACE, fewest_moves, matches
+from embodied.agents.hanna.topological_map import SAME_PLACE, matches
 from embodied.agents.vision.features import FeatureBank
 from embodied.geometry import wrap
 from embodied.interface import Action, Actions, Move, Observation, Observations, Rngs, Situation, Situations, Stop
+from embodied.policies.baselines import fewest_moves
 
 ALIKE = 0.05
 """Radians by which two directions of one way may differ."""

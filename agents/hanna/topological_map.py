@@ -15,8 +15,7 @@ views, at the best of 12 rotations, since a picture does not tell which way is n
 from __future__ import annotations
 
 import dataclasses
-from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,6 +24,7 @@ import numpy as np
 from embodied.agents.hanna.attention import HEADINGS, VIEWS, action_index
 from embodied.agents.hanna.policy import HannaMemory, HannaPolicy, Steering
 from embodied.interface import Action, Actions, Mode, Move, Observation, Observations, Rngs, Situations
+from embodied.policies.baselines import fewest_moves
 from embodied.teachers.shortest import shortest_of
 
 UNLIKELY = 1e-6
@@ -197,24 +197,6 @@ class Trail:
                 if worth > best and (place, view) not in self.leads:
                     best, chosen = worth, view if first is None else first
         return chosen
-
-
-def fewest_moves(start: int, leads: Callable[[int], Iterable[tuple[int, int]]]) -> dict[int, tuple[int, int | None]]:
-    """How many known moves lead from `start` to every place that they lead to, and which way they begin.
-
-    Args:
-      leads: the ways that are known from a place, each with the place at its end.
-    """
-    reached: dict[int, tuple[int, int | None]] = {start: (0, None)}
-    queue = deque([start])
-    while queue:
-        place = queue.popleft()
-        steps, first = reached[place]
-        for way, end in leads(place):
-            if end not in reached:
-                reached[end] = steps + 1, way if first is None else first
-                queue.append(end)
-    return reached
 
 
 def weigh_by_image(

@@ -7,7 +7,7 @@ others see Observations only.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -296,18 +296,28 @@ class HalfwaySkyline(PerEpisodePolicy):
         return shortest_of(s)
 
 
+def fewest_moves(start: int, leads: Callable[[int], Iterable[tuple[int, int]]]) -> dict[int, tuple[int, int | None]]:
+    """How many known moves lead from `start` to every place that they lead to, the nearest first, and which way they
+    begin.
+
+    Args:
+      leads: the ways that are known from a place, each with the place at its end.
+    """
+    reached: dict[int, tuple[int, int | None]] = {start: (0, None)}
+    for place in (line := [start]):
+        steps, first = reached[place]
+        for way, end in leads(place):
+            if end not in reached:
+                reached[end] = steps + 1, way if first is None else first
+                line.append(end)
+    return reached
+
+
 def step_on_known_way(ways: Mapping[int, tuple[int, ...]], here: int, goals: Container[int]) -> int | None:
     """The next place on the way of fewest steps to one of `goals`, among the places of which neighbours are known; None
     where they do not lead there, or one is there."""
-    first = {here: here}
-    for v in (line := [here]):
-        if v in goals:
-            return None if v == here else first[v]
-        for w in ways.get(v, ()):
-            if w not in first:
-                first[w] = w if v == here else first[v]
-                line.append(w)
-    return None
+    reached = fewest_moves(here, lambda v: ((w, w) for w in ways.get(v, ())))
+    return next((first for v, (_, first) in reached.items() if v in goals), None)
 
 
 def _random_move(o: Observation, rng: np.random.Generator) -> Action:
