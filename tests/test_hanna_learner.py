@@ -116,7 +116,7 @@ def identity(agent):
 def run(folder, config=TINY, split=None, **options):
     split = split or setting()
     agent = agent_for(split, config)
-    learner = HannaLearner(agent, split, HannaTeacher())
+    learner = HannaLearner(agent, split)
     progress = imitation.train(learner, split, folder, identity(agent), note=lambda line: None, **options)
     return agent, progress
 
@@ -494,7 +494,7 @@ def test_the_learning_rate_falls_over_the_last_share_of_the_updates():
     rates = [rate(u, 0.4) for u in range(100)]
     assert rates[:60] == [1e-3] * 60 and np.all(np.diff(rates[60:]) < 0) and 0 < rates[-1] < 5e-5
     assert rate(99, 0.0) == 1e-3
-    learner = HannaLearner(agent_for(setting(), config), setting(), HannaTeacher())
+    learner = HannaLearner(agent_for(setting(), config), setting())
     learner.learn(99)
     assert learner.optimizer.param_groups[0]["lr"] == rates[-1]
 
@@ -519,10 +519,10 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
     split = setting()
     agent, before = agent_for(split, config), signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
-        imitation.train(HannaLearner(agent, split, HannaTeacher()), split, tmp_path, identity(agent), note=note)
+        imitation.train(HannaLearner(agent, split), split, tmp_path, identity(agent), note=note)
     assert said[-1] == "stopped after update 20; the same command goes on from there"
     assert torch.load(tmp_path / "checkpoint.pt", weights_only=True)["progress"]["update"] == 20
     assert signal.getsignal(signal.SIGINT) is before
     agent = agent_for(split, dataclasses.replace(config, iterations=21))
-    imitation.train(HannaLearner(agent, split, HannaTeacher()), split, tmp_path, identity(agent), note=note)
+    imitation.train(HannaLearner(agent, split), split, tmp_path, identity(agent), note=note)
     assert "continuing after update 20" in said and said[-1].startswith("21/21")

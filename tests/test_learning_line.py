@@ -15,7 +15,7 @@ from hand_data import COMPACT, built, noise_features, random_encoder, small_hous
 from embodied import options
 from embodied.agents.common.settings import SHIPPED_AGENT, WEIGHTS
 from embodied.agents.common.weights import origin_of, weights_digest
-from embodied.agents.hanna.agent import HannaAbout, HannaAgent, hanna_policies, train_agent, vocabulary_of
+from embodied.agents.hanna.agent import HannaAbout, HannaAgent, HannaLearner, hanna_policies
 from embodied.agents.hanna.study import HannaStudy
 from embodied.agents.hanna.topological_map import PerfectInterpretation
 from embodied.agents.learners.hanna import HannaTraining
@@ -84,7 +84,7 @@ def test_perfect_interpretation_reaches_where_it_is_sent(tmp_path):
     noise_features(data)
     config = parsed(HannaTraining, "--data", ".", "--out", ".", *SMALL).config
     bank = TrainingData(data, load_encoder(COMPACT)).split("test_unseen").bank
-    words = vocabulary_of(data).words
+    words = HannaLearner.words_of(data, data.split("train")).words
     torch.manual_seed(0)
     agent = HannaAgent.new(HannaAbout(config=config, encoder=bank.digest, feature_size=bank.size, words=words))
     agent.network.eval()
@@ -180,7 +180,7 @@ def test_more_training_houses_than_there_are_are_refused(study, tmp_path):
     source = TrainingData(dataset_of(learner.data, "hanna"), load_encoder(learner.encoder))
     config = dataclasses.replace(learner.config, training_houses=99)
     with pytest.raises(ValueError, match="99 houses of 'train' are wanted, .* has 2; ask for fewer"):
-        train_agent(source, config, learner.evaluation, tmp_path / "run")
+        HannaLearner.train(source, config, learner.evaluation, tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 
@@ -189,7 +189,8 @@ def test_fewer_training_houses_mean_fewer_tasks_and_words(data):
     some, every = (TrainingData(data, encoder).split("train", houses=n) for n in (1, None))
     assert {t.world for t in some.tasks} == {data.names("train")[0]}
     assert 0 < len(some.tasks) < len(every.tasks)
-    assert len(vocabulary_of(data, 1).words) <= len(vocabulary_of(data).words)
+    words_of = lambda split: HannaLearner.words_of(data, split).words
+    assert len(words_of(some)) <= len(words_of(every))
 
 
 def test_a_data_set_of_another_kind_of_task_is_refused_with_the_command_that_makes_the_right_one(data):

@@ -19,7 +19,7 @@ from hand_serve import HEAD, TOGETHER, make_data, write_study
 from embodied.agents.bandit.ratings import Rater, fitted
 from embodied.agents.common.weights import load_weights
 from embodied.agents.iliad.nav.run import NavAbout
-from embodied.agents.vnla.study import vocabulary_of
+from embodied.agents.vnla.study import VnlaLearner
 from embodied.cli import main as start
 from embodied.cli.serve import drawn
 from embodied.envs.base import ActionError
@@ -580,7 +580,7 @@ def test_vnlas_advisor_says_what_people_said_of_the_same_actions(tmp_path):
     assert (*said.words, "stop") == actions and end.node == path[-1]
     voice = PeoplesWords([said], PlainLanguage())
     assert voice.subgoal(said.words) == "over there" and voice.subgoal(("left", *said.words)) != "over there"
-    assert "there" in vocabulary_of(made).words
+    assert "there" in VnlaLearner.words_of(made, made.split("train")).words
 
 
 @pytest.mark.slow

@@ -22,8 +22,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 import torch
@@ -32,7 +31,6 @@ from torch import Tensor
 
 from embodied.agents.common import imitation
 from embodied.agents.common.imitation import About, SightedAgent
-from embodied.agents.common.session import Options, Progress
 from embodied.agents.common.tensors import IGNORE, choose_at, negative_log_likelihood
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features
@@ -43,11 +41,10 @@ from embodied.agents.hanna.policy import HannaMemory, HannaPolicy, StepScores, f
 from embodied.agents.hanna.topological_map import MapPolicy, PerfectInterpretation
 from embodied.agents.hanna.training_config import RULES, HannaEvaluation, TrainingConfig, ask_patiently
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vision.sighted_study import Split, TrainingData
+from embodied.agents.vision.sighted_study import SightedLearner, Split
 from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent, Episode, Place, Task, Teacher
-from embodied.records import identity_of
 from embodied.teachers.shortest import HannaTeacher
 
 NETWORKS: Mapping[str, type[AgentNetwork]] = {"hanna": HannaNetwork, "lstm": LstmNetwork}
@@ -257,16 +254,24 @@ def help_loss(ask: Tensor, labels: Tensor, reason_logits: Tensor | None, reasons
     return loss if reason_logits is None else loss + reason_loss(reason_logits, reasons, labels)
 
 
-class HannaLearner(imitation.ImitationLearner):
+class HannaLearner(SightedLearner):
     """A HANNA agent in training."""
 
-    def __init__(self, agent: HannaAgent, training: Split, teacher: Teacher) -> None:
+    agent_kind = HannaAgent
+
+    def __init__(self, agent: HannaAgent, training: Split) -> None:
         super().__init__(agent, training)
-        config, self._teacher = agent.about.config, teacher
+        config, self._teacher = agent.about.config, HannaTeacher()
         guided = config.guided_asking if config.ask_rule == "learned" else 0.0
         self._player = for_training(
             agent.policy(training.bank).policy, RULES[config.ask_rule][0], config.environment_dropout, guided
         )
+
+    @classmethod
+    def words_of(cls, data: Dataset, training: Split) -> Vocabulary:
+        """Words of requests, and of the routes that training hears."""
+        routes = [r.instruction for n in training.worlds for r in data.routes(n) if r.split == "train_seen"]
+        return build_vocabulary([*(t.request for t in training.tasks), *routes], 2)
 
     def training_task(self, task: Task) -> Task:
         return dataclasses.replace(task, horizon=self.config.training_steps)
@@ -290,24 +295,3 @@ class HannaLearner(imitation.ImitationLearner):
             **imitation.asked(episodes, x.asks[askable], x.right_asks[askable]),
         }
         return imitation.BatchLoss(losses, losses[0] + losses[1] if c.ask_rule == "learned" else losses[0], numbers)
-
-
-def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
-    """Words of the training split's first `houses` houses: requests and the routes that training hears."""
-    names = data.names("train")[:houses]
-    routes = [r.instruction for n in names for r in data.routes(n) if r.split == "train_seen"]
-    return build_vocabulary([*(t.request for t in data.tasks("train") if t.world in names), *routes], 2)
-
-
-def train_agent(
-    source: TrainingData, config: TrainingConfig, evaluation: HannaEvaluation, folder: Path, **options: Unpack[Options]
-) -> Progress:
-    """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
-    houses = config.training_houses or None
-    training = source.split("train", houses=houses)
-    validation = source.split("val_unseen", limit=config.validation_tasks)
-    words = vocabulary_of(source.data, houses)
-    agent = HannaAgent.new(source.about(HannaAbout, config, evaluation, words))
-    agent.network.to(source.device)
-    identity = identity_of("embodied.agents.hanna.agent", settings=config, **source.identity())
-    return imitation.train(HannaLearner(agent, training, HannaTeacher()), validation, folder, identity, **options)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from embodied.agents.common.session import Note
-from embodied.agents.hanna.agent import HannaAgent, by_the_text, hanna_policies, train_agent
+from embodied.agents.hanna.agent import HannaAgent, HannaLearner, by_the_text, hanna_policies
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
@@ -43,7 +43,7 @@ class HannaStudy(SightedStudy):
     evaluation: HannaEvaluation
     device: str = "cpu"
 
-    name, agent_kind = "hanna", HannaAgent
+    name, agent_kind, learner = "hanna", HannaAgent, HannaLearner
     makers = ("embodied.agents.hanna.agent",)
     judges = (*JUDGES, "embodied.agents.hanna.agent")
 
@@ -59,10 +59,6 @@ class HannaStudy(SightedStudy):
         """Features that are missing are told before anything is trained."""
         for split in dict.fromkeys(s.removesuffix(SHIPPED) for s in splits):
             self.training_data().split(split)
-
-    def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        train_agent(self.training_data(), self.settings(train, seed), self.evaluation, home, note=note)
-        return home / "best.safetensors"
 
     def policies(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:

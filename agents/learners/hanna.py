@@ -56,7 +56,7 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
 register_learner(
     Learner(
         name="hanna",
-        train=(HannaTraining, options.training("embodied.agents.hanna.agent:train_agent", "hanna")),
+        train=(HannaTraining, options.training("embodied.agents.hanna.agent:HannaLearner.train", "hanna")),
         study=(HannaStudyOptions, options.study_by("embodied.agents.hanna.study:HannaStudy")),
         players=players,
         columns=(

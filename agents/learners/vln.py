@@ -103,7 +103,7 @@ register_learner(
         name="vln",
         train=(
             "Agents that follow route instructions.",
-            {"follower": (FollowerTraining, options.training("embodied.agents.vln.study:train_follower", "vln"))},
+            {"follower": (FollowerTraining, options.training("embodied.agents.vln.study:VlnLearner.train", "vln"))},
         ),
         study=(VlnStudyOptions, options.study_by("embodied.agents.vln.study:VlnStudy")),
         players=players,

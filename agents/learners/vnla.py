@@ -99,7 +99,7 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
 register_learner(
     Learner(
         name="vnla",
-        train=(VnlaTraining, options.training("embodied.agents.vnla.study:train_agent", "vnla")),
+        train=(VnlaTraining, options.training("embodied.agents.vnla.study:VnlaLearner.train", "vnla")),
         study=(VnlaStudyOptions, options.study_by("embodied.agents.vnla.study:VnlaStudy")),
         players=players,
         columns=(

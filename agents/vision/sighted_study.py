@@ -8,9 +8,11 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar, Unpack
 
+from embodied.agents.common import imitation
 from embodied.agents.common.imitation import About, SightedAgent, TaskSet
+from embodied.agents.common.session import Note, Options, Progress
 from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.learner import PlaySettings
@@ -27,6 +29,7 @@ from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import spread
 from embodied.gym.sensors import PanoramaStore
 from embodied.interface import Agent
+from embodied.records import identity_of
 
 A = TypeVar("A", bound=About)
 
@@ -106,6 +109,35 @@ def evaluation_data(data: Dataset, how: PlaySettings) -> TrainingData:
     return TrainingData(data, encoder, how.pictures, goal_image=how.goal_image, cache=how.cache)
 
 
+class SightedLearner(imitation.ImitationLearner):
+    """An agent that sees features in training; who derives from it says `agent_kind` and `words_of`, too."""
+
+    agent_kind: ClassVar[type[SightedAgent]]
+
+    @classmethod
+    def splits(cls, source: TrainingData, config: Any) -> tuple[Split, Split]:
+        """Tasks to learn from, and to validate with."""
+        training = source.split("train", houses=config.training_houses or None)
+        return training, source.split("val_unseen", limit=config.validation_tasks)
+
+    @classmethod
+    def words_of(cls, data: Dataset, training: Split) -> Vocabulary:
+        """The words that it learns."""
+        raise NotImplementedError
+
+    @classmethod
+    def train(
+        cls, source: TrainingData, config: Any, evaluation: Any, folder: Path, **options: Unpack[Options]
+    ) -> Progress:
+        """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
+        training, validation = cls.splits(source, config)
+        words = cls.words_of(source.data, training)
+        agent = cls.agent_kind.new(source.about(cls.agent_kind.about_kind, config, evaluation, words))
+        agent.network.to(source.device)
+        identity = identity_of(cls.__module__, settings=config, **source.identity())
+        return imitation.train(cls(agent, training), validation, folder, identity, **options)
+
+
 TEST_SPLITS = ("test_seen", "test_unseen")
 
 
@@ -159,7 +191,7 @@ class FeatureStudy(EpisodeStudy):
 
 @dataclass(frozen=True, kw_only=True)
 class SightedStudy(FeatureStudy):
-    """A study of agents that learn by imitation. A learner says its tables, `agent_kind` and `train`."""
+    """A study of agents that learn by imitation. A learner says its tables, `agent_kind` and `learner` (or `train`)."""
 
     config: ImitationSettings
     evaluation: EvaluationSettings = EvaluationSettings()
@@ -167,9 +199,14 @@ class SightedStudy(FeatureStudy):
     """Training seeds of every row but those of the unchanged settings; None: as many."""
 
     agent_kind: ClassVar[type[SightedAgent]]
+    learner: ClassVar[type[SightedLearner]]
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
         return self.repeats[: self.others] if row.train else super().seeds(row)
+
+    def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
+        self.learner.train(self.training_data(), self.settings(train, seed), self.evaluation, home, note=note)
+        return home / "best.safetensors"
 
     def load(self, weights: Path) -> Any:
         agent = self.agent_kind.load(weights)

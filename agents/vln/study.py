@@ -8,26 +8,23 @@ learner of the studies' engine.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Unpack
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor
 
 from embodied.agents.common import imitation
-from embodied.agents.common.session import Note, Options, Progress
-from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.tensors import IGNORE, choose_sampled, negative_log_likelihood
-from embodied.agents.common.vocabulary import build_vocabulary
+from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.learners.vln import FollowerSettings
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import study_tables
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vision.sighted_study import SightedStudy, Split, TrainingData
-from embodied.agents.vln.policy import VlnAbout, VlnAgent, VlnMoment
+from embodied.agents.vision.sighted_study import SightedLearner, SightedStudy, Split, TrainingData
+from embodied.agents.vln.policy import VlnAgent, VlnMoment
 from embodied.assets.cache import digest
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import code_digest
@@ -36,17 +33,27 @@ from embodied.datasets.store import Dataset
 from embodied.interface import Agent, Episode, Route, Task
 from embodied.kinds.shipped.vln import vln_task
 from embodied.language import People
-from embodied.records import identity_of, load_lines, save_lines
+from embodied.records import load_lines, save_lines
 from embodied.seeds import stream
 
 LONGEST_EPISODE = 12
 """Steps of an episode of training: described paths have at most six, and who is lost learns little more."""
 
 
-class VlnLearner(imitation.ImitationLearner):
+class VlnLearner(SightedLearner):
     """A follower in training."""
 
-    optimizer_kind = torch.optim.AdamW
+    agent_kind, optimizer_kind = VlnAgent, torch.optim.AdamW
+
+    @classmethod
+    def splits(cls, source: TrainingData, config: FollowerSettings) -> tuple[Split, Split]:
+        training, validation = super().splits(source, config)
+        tasks = [*training.tasks, *(more_tasks(source, training, config) if config.more_paths else ())]
+        return dataclasses.replace(training, tasks=tasks), validation
+
+    @classmethod
+    def words_of(cls, data: Dataset, training: Split) -> Vocabulary:
+        return build_vocabulary(t.request for t in training.tasks)
 
     def training_task(self, task: Task) -> Task:
         return dataclasses.replace(task, horizon=min(task.horizon, LONGEST_EPISODE))
@@ -92,25 +99,6 @@ def _rooms(m: VlnMoment) -> Tensor:
     return (lost.sum(1) / (m.rooms != IGNORE).sum(1)).sum()
 
 
-def train_follower(
-    source: TrainingData,
-    config: FollowerSettings,
-    evaluation: EvaluationSettings,
-    folder: Path,
-    **options: Unpack[Options],
-) -> Progress:
-    """Train, or go on training, the follower of a run folder; other arguments as in agents.common.imitation.train."""
-    training = source.split("train", houses=config.training_houses or None)
-    validation = source.split("val_unseen", limit=config.validation_tasks)
-    if config.more_paths:
-        training = dataclasses.replace(training, tasks=[*training.tasks, *more_tasks(source, training, config)])
-    words = build_vocabulary(t.request for t in training.tasks)
-    agent = VlnAgent.new(source.about(VlnAbout, config, evaluation, words))
-    agent.network.to(source.device)
-    identity = identity_of("embodied.agents.vln.study", settings=config, **source.identity())
-    return imitation.train(VlnLearner(agent, training), validation, folder, identity, **options)
-
-
 def more_tasks(source: TrainingData, training: Split, config: FollowerSettings) -> list[Task]:
     """Tasks of further paths through the training houses; the same for all training seeds."""
     more = lambda name: more_routes(source.data, name, config.more_paths, seed=0, cache=source.cache)
@@ -139,10 +127,6 @@ class VlnStudy(SightedStudy):
 
     config: FollowerSettings
 
-    name, agent_kind, all_tables = "vln", VlnAgent, study_tables("vln")
+    name, agent_kind, learner, all_tables = "vln", VlnAgent, VlnLearner, study_tables("vln")
     makers = ("embodied.agents.vln.study",)
     judges = (*JUDGES, "embodied.agents.vln.policy")
-
-    def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        train_follower(self.training_data(), self.settings(train, seed), self.evaluation, home, note=note)
-        return home / "best.safetensors"

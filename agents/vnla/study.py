@@ -15,8 +15,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -24,8 +23,7 @@ from torch import Tensor
 from embodied.action_spaces import WORDS
 from embodied.agents.common import imitation
 from embodied.agents.common.imitation import About, SightedAgent, Supervised
-from embodied.agents.common.session import Note, Options, Progress, descend, seeded_dropout, set_learning_rate
-from embodied.agents.common.settings import EvaluationSettings
+from embodied.agents.common.session import descend, seeded_dropout, set_learning_rate
 from embodied.agents.common.tensors import choose_at, negative_log_likelihood
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features
@@ -33,7 +31,7 @@ from embodied.agents.learners.vnla import VnlaSettings
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import study_tables
 from embodied.agents.vision.features import FeatureBank
-from embodied.agents.vision.sighted_study import SightedStudy, Split, TrainingData
+from embodied.agents.vision.sighted_study import SightedLearner, SightedStudy, Split, TrainingData
 from embodied.agents.vnla.network import VnlaNetwork, lessons_of, reading_loss
 from embodied.agents.vnla.policy import VnlaMoment, VnlaPolicy, for_training
 from embodied.assistants.advisor import HELP_STEPS
@@ -41,7 +39,6 @@ from embodied.datasets.store import Dataset, SplitData
 from embodied.interface import Agent, Episode
 from embodied.kinds.shipped.vnla import VNLA
 from embodied.language.plain_language import PlainLanguage
-from embodied.records import identity_of
 from embodied.seeds import stream
 from embodied.teachers.vnla import VnlaTeacher
 
@@ -113,10 +110,23 @@ class VnlaAgent(SightedAgent):
         return Supervised(policy, {"as_teacher": True}) if shown else policy
 
 
-class VnlaLearner(imitation.ImitationLearner):
+class VnlaLearner(SightedLearner):
     """A VNLA agent in training."""
 
-    optimizer_kind = torch.optim.AdamW
+    agent_kind, optimizer_kind = VnlaAgent, torch.optim.AdamW
+
+    @classmethod
+    def splits(cls, source: TrainingData, config: VnlaSettings) -> tuple[Split, Split]:
+        rules = "direct" if config.rules == "indirect" else config.rules
+        training = source.split("train", houses=config.training_houses or None, rules=rules)
+        return training, source.split("val_unseen", limit=config.validation_tasks, rules=config.rules)
+
+    @classmethod
+    def words_of(cls, data: Dataset, training: Split) -> Vocabulary:
+        """Words of the requests, and of all that the advisor can say."""
+        answers = [PlainLanguage().subgoal([w] * n + ["stop"]) for w in WORDS for n in range(1, HELP_STEPS + 1)]
+        said = data.utterances(tuple(training.worlds))
+        return build_vocabulary([*(t.request for t in training.tasks), *answers, *(s.text for s in said)])
 
     def __init__(self, agent: VnlaAgent, training: Split) -> None:
         super().__init__(agent, training)
@@ -160,28 +170,6 @@ def losses_of(moments: Sequence[VnlaMoment], episodes: int) -> tuple[Tensor, Ten
     return navigation, negative_log_likelihood(asks, wished).sum() / episodes
 
 
-def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
-    """Words of the requests in the training split's first `houses` houses, and of all that the advisor can say."""
-    names = data.names("train")[:houses]
-    requests = [t.request for t in data.tasks("train") if t.world in names]
-    answers = [PlainLanguage().subgoal([w] * n + ["stop"]) for w in WORDS for n in range(1, HELP_STEPS + 1)]
-    return build_vocabulary([*requests, *answers, *(s.text for s in data.utterances(names))])
-
-
-def train_agent(
-    source: TrainingData, config: VnlaSettings, evaluation: EvaluationSettings, folder: Path, **options: Unpack[Options]
-) -> Progress:
-    """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
-    houses = config.training_houses or None
-    training = source.split("train", houses=houses, rules="direct" if config.rules == "indirect" else config.rules)
-    validation = source.split("val_unseen", limit=config.validation_tasks, rules=config.rules)
-    words = vocabulary_of(source.data, houses)
-    agent = VnlaAgent.new(source.about(VnlaAbout, config, evaluation, words))
-    agent.network.to(source.device)
-    identity = identity_of("embodied.agents.vnla.study", settings=config, **source.identity())
-    return imitation.train(VnlaLearner(agent, training), validation, folder, identity, **options)
-
-
 EVALUATION_SEEDS = (123, 435, 6757, 867, 983)
 """The program's."""
 
@@ -193,13 +181,9 @@ class VnlaStudy(SightedStudy):
     config: VnlaSettings
     eval_seeds: tuple[int, ...] = EVALUATION_SEEDS
 
-    name, agent_kind, all_tables = "vnla", VnlaAgent, study_tables("vnla")
+    name, agent_kind, learner, all_tables = "vnla", VnlaAgent, VnlaLearner, study_tables("vnla")
     makers = ("embodied.agents.vnla.study",)
     judges = (*JUDGES, "embodied.agents.vnla.study")
-
-    def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        train_agent(self.training_data(), self.settings(train, seed), self.evaluation, home, note=note)
-        return home / "best.safetensors"
 
     def policies(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:

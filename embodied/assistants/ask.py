@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from embodied.geometry import wrap
+from embodied.assistants.descriptions import side
 from embodied.house.house import Placement
-from embodied.interface import STEP, FindDescribed, Intention, Place, Reply, Situation, Subtask
+from embodied.interface import FindDescribed, Intention, Place, Reply, Situation, Subtask
 from embodied.language.plain_language import PlainLanguage, floors_away
 from embodied.language.templates import intention_of
 from embodied.navigation.graph import nearest
@@ -173,14 +173,8 @@ def _which(s: Situation) -> tuple[str, set[str]]:
     if goal.placement not in seen:
         return "None of those that you see.", {*goal.fitting, *goal.similar} - set(seen)
     yaw, distance = seen[goal.placement]
-    return f"The one {_side(float(wrap(yaw - s.pose.yaw)))}, {distance:.1f} m from you.", {goal.placement}
-
-
-def _side(bearing: float) -> str:
-    steps = round(bearing / STEP)
-    if steps == 0:
-        return "straight ahead"
-    return "behind you" if abs(steps) >= 6 else f"{30 * abs(steps)} degrees to your {'left' if steps > 0 else 'right'}"
+    where = side(yaw - s.pose.yaw).replace("to the", "to your")
+    return f"The one {where}, {distance:.1f} m from you.", {goal.placement}
 
 
 def _beside(world: Place, thing: Placement) -> str:
