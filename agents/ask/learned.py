@@ -23,7 +23,7 @@ from torch import nn
 
 from embodied.agents.ask.config import AskerConfig
 from embodied.agents.common.weights import load_weights, seeded
-from embodied.assistants.ask import CONFIRM_DISTANCE, in_view
+from embodied.assistants.ask import CONFIRM_DISTANCE, QUESTIONS, in_view
 from embodied.envs.ask import AskEnv
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.evaluate import play
@@ -56,17 +56,8 @@ SLOW = 0.0003
 """The worth of a step: of two ways that succeed alike, the shorter one."""
 Choice = Intention | str
 """A question, 'go' or 'stop'."""
-CHOICES: tuple[Choice, ...] = (
-    "go",
-    "stop",
-    Intention.CONFIRM,
-    Intention.APPEARANCE,
-    Intention.REGION,
-    Intention.ROUTE,
-    Intention.DISAMBIGUATE,
-)
-
-
+TYPED = tuple(q for q in QUESTIONS if q is not Intention.FREE)
+CHOICES: tuple[Choice, ...] = ("go", "stop", *TYPED)
 ONCE = (Intention.APPEARANCE, Intention.REGION)
 """Questions whose answers stay the same."""
 HERE = (Intention.CONFIRM, Intention.DISAMBIGUATE)
@@ -76,7 +67,7 @@ HERE = (Intention.CONFIRM, Intention.DISAMBIGUATE)
 def possible(o: Observation, trail: EpisodeMemory) -> list[Choice]:
     """The choices that can be made; no question twice whose answer is known."""
     known = [q for q in ONCE if trail.asked.get(q)] + [q for q in HERE if trail.asked_at.get(q) == trail.moment]
-    questions = [c for c in CHOICES if isinstance(c, Intention) and c in o.can_ask and c not in known]
+    questions = [q for q in TYPED if q in o.can_ask and q not in known]
     return ["go", *(["stop"] if reached(o) else []), *questions]
 
 
@@ -190,7 +181,6 @@ def _copy(env: HelpEnv) -> HelpEnv:
     return other
 
 
-QUESTIONS = tuple(c for c in CHOICES if isinstance(c, Intention))
 SEEN = 3
 """Detections that are told one by one, the best first."""
 ASKER_BATCH = 512
@@ -219,8 +209,8 @@ def facts(o: Observation, trail: EpisodeMemory) -> np.ndarray:
     # after a yes the score stays, after a no it falls
     answer = [float(confirmed), trail.before - score if confirmed else 0.0, float(confirmed and score >= trail.before)]
     margin = [max(0.0, score - LIKELY), max(0.0, score - LIKELY - 0.2), float(score > LIKELY + 0.2)]
-    asked = [min(trail.asked.get(q, 0), 3) / 3 for q in QUESTIONS]
-    can = [float(q in o.can_ask) for q in QUESTIONS]
+    asked = [min(trail.asked.get(q, 0), 3) / 3 for q in TYPED]
+    can = [float(q in o.can_ask) for q in TYPED]
     return np.array([*plain, *words, *view, *each, *here, *answer, *margin, *asked, *can], dtype=np.float32)
 
 

@@ -151,7 +151,7 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
             and rng.random() < 0.85
             and not _stands_alone(text, kinds, last, before)
         ):
-            link = _link(speaker, bool(set(before) & ARRIVING), rng)
+            link = _link(speaker, not {*before} <= STANDING, rng)
             link = "then" if link in links else link  # nobody says 'next' twice
             links |= {link} - {"and", "then", ""}
             if text.startswith("and ") or not link:
@@ -182,24 +182,8 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
     return " ".join(s[0].upper() + s[1:] + "." for s in sentences)
 
 
-ARRIVING = frozenset(
-    [
-        "exit",
-        "enter",
-        "door",
-        "open_door",
-        "open_door_side",
-        "climb",
-        "climb_half",
-        "cross",
-        "forward",
-        "metres",
-        "to",
-        "past",
-        "past_side",
-    ]
-)
-"""Clauses that lead somewhere, so that 'once there' may follow."""
+STANDING = {"turn", "slight", "around", "avoid", "notice", "stop_by", "stop_in", "stop_here"}
+"""Clauses that lead nowhere; after others 'once there' may follow."""
 _SUBJECTS = re.compile(r"(you|you'll|your|that|that's|this|if|I|the|not|bingo|done|end)\b")
 
 
@@ -330,14 +314,8 @@ def _patterns() -> tuple[_Pattern, ...]:
         before, thing, after = text.partition("{thing}")
         first = t.text.split(" ", 1)[0].lower()
         whole = r"(?![\w-])"
-        patterns.append(
-            _Pattern(
-                t,
-                "" if first.startswith("{") else first,
-                re.compile(before + ("the " if thing else whole)),
-                re.compile(after + whole) if thing else None,
-            )
-        )
+        start, end = re.compile(before + ("the " if thing else whole)), re.compile(after + whole) if thing else None
+        patterns.append(_Pattern(t, "" if first.startswith("{") else first, start, end))
     return tuple(patterns)
 
 
@@ -364,10 +342,6 @@ def _made(name: str, slots: Mapping[str, str], rooms: Iterator[str], thing: mean
     if name == "past_side":
         return meaning.Past(cast(meaning.Referent, thing), slots["side"])
     made: Any = next(c for c, known in _NAMES.items() if known == name)
-    return (
-        made(next(rooms))
-        if issubclass(made, meaning.OfRoom)
-        else made(thing)
-        if issubclass(made, meaning.OfThing)
-        else made()
-    )
+    if issubclass(made, meaning.OfRoom):
+        return made(next(rooms))
+    return made(thing) if issubclass(made, meaning.OfThing) else made()
