@@ -137,11 +137,9 @@ class AskEnv(HelpEnv):
     def _advised(self) -> interface.Move | interface.Stop | None:
         if not self.rules.grounded or not self._way:
             return None
-        return (
-            interface.Stop()
-            if len(self._way) == 1
-            else interface.Move(self.situation.candidate_nodes.index(self._way[1]))
-        )
+        if len(self._way) == 1:
+            return interface.Stop()
+        return interface.Move(self.situation.candidate_nodes.index(self._way[1]))
 
     def _detections(self) -> tuple[interface.Detection, ...]:
         known = self._fitting if self.rules.grounded else self._goal.fitting

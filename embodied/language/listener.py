@@ -143,20 +143,10 @@ def _onward(eyes: Lookout, clause: meaning.Clause, walk: _Walk) -> Iterator[tupl
 def _step_cost(clause: meaning.Clause, way: Way, walk: _Walk) -> float:
     """Of one step in itself: turns that were not asked for, but for the one into a counted door."""
     turned = float(wrap(way.yaw - walk.facing))
-    if (
-        way.leaves
-        and isinstance(clause, meaning.Enter)
-        and clause.nth
-        and (turned > 0) == (clause.side == meaning.LEFT)
-    ):
-        return 0.12
-    if (
-        way.closed
-        and isinstance(clause, meaning.OpenDoor)
-        and clause.side
-        and (turned > 0) == (clause.side == meaning.LEFT)
-    ):
-        return 0.12
+    if isinstance(clause, meaning.Enter | meaning.OpenDoor):
+        through = way.leaves and clause.nth if isinstance(clause, meaning.Enter) else way.closed and clause.side
+        if through and (turned > 0) == (clause.side == meaning.LEFT):
+            return 0.12
     wanted = walk.pending if walk.steps == 0 else 0.0
     return 0.12 + turn_cost(turned, wanted, asked=walk.steps == 0 and walk.pending != 0.0)
 

@@ -199,16 +199,11 @@ def _crossing(telling: _Telling, leg: Leg, *, first: bool) -> list[Phrase]:
 
 def _counted(eyes: Lookout, walked: Sequence[int], crossing: list[Phrase]) -> list[Phrase]:
     """The crossing by 'the second door on the left', where there is more than one to choose from; else nothing."""
-    door = doorway(eyes, walked)
-    if (
-        door is None
-        or door[2] < 2
-        or door[1] >= len(SPOKEN.ordinals)
-        or not isinstance(crossing[-1].clause, meaning.Enter)
-    ):
+    door, last = doorway(eyes, walked), crossing[-1].clause
+    if door is None or not isinstance(last, meaning.Enter):
         return []
-    side, nth, _ = door
-    return [Phrase(meaning.Enter(crossing[-1].clause.kind, side, nth))]
+    side, nth, doors = door
+    return [Phrase(meaning.Enter(last.kind, side, nth))] if doors > 1 and nth < len(SPOKEN.ordinals) else []
 
 
 def _mark(telling: _Telling, leg: Leg, *, needed: bool) -> Phrase | None:
@@ -275,11 +270,7 @@ def _stop(telling: _Telling, path: Sequence[int], crossed: bool, phrases: Sequen
                 telling.used.add(thing.placement)
                 return Phrase(meaning.StopBy(telling.lexicon.thing(word)), word)
     # nobody says 'enter the hall and stop in the hall'
-    return (
-        Phrase(meaning.StopIn(end.kind))
-        if crossed and not isinstance(last, meaning.Enter)
-        else Phrase(meaning.StopHere())
-    )
+    return Phrase(meaning.StopIn(end.kind) if crossed and not isinstance(last, meaning.Enter) else meaning.StopHere())
 
 
 def _name(telling: _Telling, thing: VisibleThing, view: Surroundings) -> Word | None:

@@ -154,14 +154,9 @@ def random_rule(shape: RuleShape, words: Sequence[str], *, rng: np.random.Genera
 def _places(shape: RuleShape, word: str) -> list[int]:
     """Positions in `word` at which the shape's block fits, whatever its letters are."""
     n = len(shape.block)
-    fits = {
-        LETTER: lambda c: True,
-        ANY: lambda c: True,
-        VOWEL: lambda c: c in VOWELS,
-        CONSONANT: lambda c: c not in VOWELS,
-    }
+    fits = lambda symbol, letter: symbol in (LETTER, ANY) or (symbol == VOWEL) == (letter in VOWELS)
     first = {START: [0], END_MARK: [len(word) - n]}.get(shape.anchor, range(len(word) - n + 1))
-    return [p for p in first if p >= 0 and all(fits[s](word[p + k]) for k, s in enumerate(shape.block))]
+    return [p for p in first if p >= 0 and all(fits(s, word[p + k]) for k, s in enumerate(shape.block))]
 
 
 def edit_distance(a: str, b: str) -> int:
