@@ -197,11 +197,8 @@ class StateNetwork(nn.Module):
         """
         lengths = (percept.tokens != 0).sum(1)
         keys, values = m.text_keys, m.text_values
-        for rows in (
-            (percept.new_task & (lengths <= SHORT)).nonzero()[:, 0],
-            (percept.new_task & (lengths > SHORT)).nonzero()[:, 0],
-        ):
-            if len(rows):
+        for alike in (lengths <= SHORT, lengths > SHORT):
+            if len(rows := (percept.new_task & alike).nonzero()[:, 0]):
                 width = int(lengths[rows].max())
                 text = self.text_encoder(percept.tokens[rows, :width])  # (k, width, h)
                 wide = (0, 0, 0, keys.shape[1] - width)

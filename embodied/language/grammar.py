@@ -145,12 +145,8 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
     current, length, hedged = "", 0, False
     for n, (text, kinds) in enumerate(pieces):
         last, before = pieces[n - 1] if n else ("", ())
-        if (
-            n
-            and length < speaker.clauses_per_sentence
-            and rng.random() < 0.85
-            and not _stands_alone(text, kinds, last, before)
-        ):
+        joined = n and length < speaker.clauses_per_sentence and rng.random() < 0.85
+        if joined and not _stands_alone(text, kinds, last, before):
             link = _link(speaker, not {*before} <= STANDING, rng)
             link = "then" if link in links else link  # nobody says 'next' twice
             links |= {link} - {"and", "then", ""}
@@ -158,9 +154,8 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
                 current += f", {text}"
             elif link in ("and", "then", "and then"):
                 current += f"{',' if hedged or rng.random() > 0.6 else ''} {link} {text}"
-            elif (
-                " " not in link or rng.random() < 0.4
-            ):  # 'next', 'after that', 'once there': no comma alone can join with these
+            elif " " not in link or rng.random() < 0.4:
+                # 'next', 'after that', 'once there': no comma alone can join with these
                 sentences.append(current)
                 current, length = f"{link}, {text}", 0
             else:
@@ -170,11 +165,8 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
         if current:
             sentences.append(current)
         current, length, hedged = text, 1, False
-        if (
-            n == 0
-            and rng.random() < speaker.openings
-            and (fillers := (*SPOKEN.fillers[speaker.habit], *SPOKEN.fillers[""]))
-        ):
+        fillers = (*SPOKEN.fillers[speaker.habit], *SPOKEN.fillers[""])
+        if n == 0 and rng.random() < speaker.openings and fillers:
             current = f"{fillers[int(rng.integers(len(fillers)))]}, {text}"
         elif rng.random() < speaker.hedges:
             current, hedged = f"{text}, {SPOKEN.hedges[int(rng.integers(len(SPOKEN.hedges)))]}", True

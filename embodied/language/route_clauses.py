@@ -285,12 +285,7 @@ def _name(telling: _Telling, thing: VisibleThing, view: Surroundings) -> Word | 
         )
         if not says(thing.asset, meant := lexicon.thing(word)):
             continue
-        others = [
-            t
-            for t in view.things
-            if t.placement != thing.placement and says(t.asset, meant) and t.asset.key != thing.asset.key
-        ]
-        if not others:
+        if all(t.asset.key == thing.asset.key for t in view.things if says(t.asset, meant)):
             return word
     return None
 

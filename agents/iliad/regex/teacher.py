@@ -177,17 +177,12 @@ class LearnedTeacher(DescribingNetworks):
         The first word that was changed is tried first and the others only where that one fits.
         """
         first = [next((j for j, w in enumerate(q.words) if (e.outputs or ())[j] != w), 0) for q, e, _ in cases]
-        fits = self._reproduces([(q.words[j], (e.outputs or ())[j], d) for (q, e, d), j in zip(cases, first)])
+        changed = lambda i, j: (cases[i][0].words[j], (cases[i][1].outputs or ())[j], cases[i][2])
+        fits = self._reproduces([changed(i, j) for i, j in enumerate(first)])
         left = [i for i, fit in enumerate(fits) if fit]
-        others = [
-            (i, (q.words[j], (e.outputs or ())[j], d))
-            for i in left
-            for q, e, d in [cases[i]]
-            for j in range(len(q.words))
-            if j != first[i]
-        ]
+        others = [(i, j) for i in left for j in range(len(cases[i][0].words)) if j != first[i]]
         passed = dict.fromkeys(left, True)
-        for (i, _), fit in zip(others, self._reproduces([case for _, case in others])):
+        for (i, _), fit in zip(others, self._reproduces([changed(i, j) for i, j in others])):
             passed[i] &= fit
         return [passed.get(i, False) for i in range(len(cases))]
 

@@ -29,14 +29,8 @@ QUESTION_LIMITS = range(1, 6)
 def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.PartTasks:
     """The same of all parts, but for the classes that are kept from training."""
     look = look_of(getattr(inputs.world, "catalogue", None))
-    return {
-        part: ask_tasks(
-            ask_pool(inputs.world, look, seed=inputs.seed, unseen=True if part == UNSEEN_CLASSES else None),
-            n,
-            seed=inputs.seed,
-        )
-        for part, n in parts
-    }
+    pool = lambda unseen: ask_pool(inputs.world, look, seed=inputs.seed, unseen=unseen)
+    return {n: ask_tasks(pool(n == UNSEEN_CLASSES or None), count, seed=inputs.seed) for n, count in parts}
 
 
 def environments(inputs: task_kind.EnvInputs) -> task_kind.EnvMaker:
