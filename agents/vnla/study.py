@@ -125,8 +125,8 @@ class VnlaLearner(SightedLearner):
     def words_of(cls, data: Dataset, training: Split) -> Vocabulary:
         """Words of the requests, and of all that the advisor can say."""
         answers = [PlainLanguage().subgoal([w] * n + ["stop"]) for w in WORDS for n in range(1, HELP_STEPS + 1)]
-        said = data.utterances(tuple(training.worlds))
-        return build_vocabulary([*(t.request for t in training.tasks), *answers, *(s.text for s in said)])
+        people = (s.text for s in data.utterances(tuple(training.worlds)))
+        return build_vocabulary([*(t.request for t in training.tasks), *answers, *people])
 
     def __init__(self, agent: VnlaAgent, training: Split) -> None:
         super().__init__(agent, training)
