@@ -14,6 +14,7 @@ from conftest import two_rooms
 from hand_chat import ChatServer, first_allowed
 
 from embodied.assets.catalogue import load_catalogue
+from embodied.assets.people.figures import person_of
 from embodied.cli import main
 from embodied.datasets.vqa.build import VqaData, asked_about
 from embodied.datasets.vqa.scene import WalkScene
@@ -150,6 +151,37 @@ def test_no_more_is_left_out_than_a_model_guesses():
     most = np.arange(100) < 60
     kept = [int(q.id) for q in less_guessed(asked, most.astype(float), sure)]
     assert np.mean(most[kept]) <= 0.53 and 80 < len(kept) < 90 and {*range(60, 100)} <= {*kept}
+
+
+def test_people_are_told_apart_by_how_they_look():
+    key = next(a.key for a in load_catalogue(None).of_class("person") if {"female", "standing"} <= {*a.tags})
+    woman = Placement("person_1", key, "person", "living_room_1", (2.5, 0.6, 0.0), 0.0, (0.6, 0.4, 1.8))
+    other = next(
+        a.key
+        for a in load_catalogue(None).of_class("person")
+        if a.name != person_of(key).words
+        and {"female", "standing"} <= {*a.tags}
+        and person_of(a.key).noun == person_of(key).noun
+    )
+    two = scene(person=woman)
+    house = dataclasses.replace(
+        two.house,
+        placements=(
+            *two.house.placements,
+            dataclasses.replace(woman, id="person_2", asset=other, position=(3.5, 0.6, 0.0)),
+        ),
+    )
+    frames = tuple(
+        dataclasses.replace(f, shares={**f.shares, "person_2": 0.02}, clear=(*f.clear, "person_2"))
+        for f in two.walk.frames
+    )
+    two = WalkScene(dataclasses.replace(two.walk, frames=frames), house, two.graph, load_catalogue(None)).asked(
+        "person_room", np.random.default_rng(0)
+    )
+    assert {p.id: name for p, name in two.people()} == {
+        "person_1": f"the {person_of(key).words}",
+        "person_2": f"the {person_of(other).words}",
+    }
 
 
 def test_plurals():

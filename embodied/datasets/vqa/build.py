@@ -19,7 +19,7 @@ from embodied.assets.cache import digest, drafts, write_json
 from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.datasets.build import Watch, for_each_unit, make_dataset_house
 from embodied.datasets.checks import DatasetError
-from embodied.datasets.vqa.scene import WalkScene
+from embodied.datasets.vqa.scene import WalkScene, easily_moved
 from embodied.datasets.vqa.scoring import VqaQuestion, thinned
 from embodied.datasets.vqa.types import CHANGE, TYPES
 from embodied.datasets.vqa.walks import Walk, cameras, film, look_around, tour, view_of
@@ -39,10 +39,8 @@ from embodied.world import World
 WALKS, CHANGES, ROOMS, SPARE, WRITERS = 2, 2, 4, 6, 3
 """Walks through a house; its rooms that are visited twice; most rooms of each walk; times as many questions as are
 wanted that are drawn; people who ask."""
-EASILY_MOVED = ("chair", "stool", "plant", "basket", "box", "bag", "table", "toy", "horse", "suitcase", "stand", "bin")
-LEAST_MOVED, MOVED_BY = 0.3, 1.0
-"""Parts of the names of classes of what is moved between two visits, its longest side at least, and how far it is moved
-and ends from the camera, metres."""
+MOVED_BY = 1.0
+"""How far something is moved between two visits, and ends from the camera, metres."""
 
 
 @dataclass(frozen=True)
@@ -128,9 +126,8 @@ def two_visits(world: World, node: int, to: Path, name: str, rng: np.random.Gene
     floor = world.house.floor(world.house.room_by_id[room])
     low, high = np.reshape(floor.bounds, (2, 2))
     can = sorted(loose(world.house, world.catalogue))
-    moved = [p for p in map(world.house.placement_by_id.get, can) if p and p.room == room and p.parent is None]
-    light = (p for p in moved if any(word in p.object_class for word in EASILY_MOVED) and max(p.size) > LEAST_MOVED)
-    moved = [p for p in light if any(p.id in f.clear for f in frames)]
+    moved = [p for p in map(world.house.placement_by_id.get, can) if p and p.room == room and easily_moved(p)]
+    moved = [p for p in moved if any(p.id in f.clear for f in frames)]
     for p in rng.permutation(np.array(moved, dtype=object)).tolist():
         for spot in rng.uniform(low, high, (100, 2)):
             body, apart = max(p.size[:2]) / 2, (math.dist(spot, at) for at in (p.position[:2], eye[:2]))
@@ -151,8 +148,9 @@ def scenes_of(folder: Path, split: str, houses: int, cache: Path) -> list[WalkSc
         walks = [from_plain(Walk, read_json(file)) for file in sorted(home.glob("walk_*/walk.json"))]
         scenes += [WalkScene(walk, house, graph, catalogue) for walk in walks]
     shown = [(s.house.name, name) for s in scenes for name in sorted({p.object_class for p in s.things})]
+    rests = {(s.carrier_of(p), p.object_class) for s in scenes for p in s.house.placements if p.parent is not None}
     for scene in scenes:
-        scene.elsewhere = [name for house_name, name in shown if house_name != scene.house.name]
+        scene.elsewhere, scene.rests = [name for house_name, name in shown if house_name != scene.house.name], rests
     return scenes
 
 
@@ -177,14 +175,17 @@ def unguessed(config: VqaConfig, left: dict[str, list[VqaQuestion]], workers: in
 
 
 def asked_about(scene: WalkScene, most: int, seed: int) -> list[VqaQuestion]:
-    """Up to so many questions of every type about a walk, in the words of several people."""
+    """Up to so many questions of every type about a walk, no answer too often, in the words of several people."""
     questions: dict[tuple[str, ...], VqaQuestion] = {}
     types = [name for name in TYPES if (name == CHANGE) == (scene.walk.moved is not None)]
     for name, writer in itertools.product(types, range(WRITERS)):
-        s = scene.asked(name, stream(seed, "questions", scene.walk.name, name, writer))
-        for q in itertools.islice(TYPES[name](s), -(-most // WRITERS)):
+        s, answers = scene.asked(name, stream(seed, "questions", scene.walk.name, name, writer)), Counter[str]()
+        for q in TYPES[name](s):
             number = f"{scene.walk.name}_{name}_{len(questions)}"
-            if len({*q.options}) == len(q.options):
+            if answers.total() * WRITERS >= most:
+                break
+            if len({*q.options}) == len(q.options) and answers[q.answer] * WRITERS * max(len(q.options), 1) < most:
+                answers[q.answer] += (name, *q.about) not in questions
                 questions.setdefault((name, *q.about), dataclasses.replace(q, id=number))
     return [*questions.values()]
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import read_toml
+from embodied.assets.people.figures import person_of
 from embodied.datasets.vqa.scoring import VqaQuestion
 from embodied.datasets.vqa.walks import GLIMPSE, Walk
 from embodied.generate.people import CLASS
@@ -30,24 +31,25 @@ ASKING: Mapping[str, Any] = read_toml(Path(templates.__file__).with_name("vqa.to
 ALIKE: Mapping[str, list[str]] = {name: group for group in ASKING["alike"] for name in group}
 
 
-PEOPLE = (
-    {"child": "child", "female": "woman", "male": "man"},
-    {"standing": "standing", "sitting": "sitting", "sitting_floor": "sitting"},
-)
-"""Words for people, and for what they do, by a tag of theirs."""
+EASILY_MOVED = ("chair", "stool", "plant", "basket", "box", "bag", "table", "toy", "horse", "suitcase", "stand", " bin")
+LEAST_MOVED = 0.3
+"""Parts of the names of classes of what is moved between two visits, and its longest side at least, metres."""
 
 
 class WalkScene:
     """All that questions about a walk rest on, and who asks: `by` draws from `rng`.
 
     `clear`, `glimpsed`: what is seen clearly, and at all, to the first frame that shows it; `rooms`: those that their
-    kind tells from all others.
+    kind tells from all others; `elsewhere` and `rests`: classes that walks through other houses show, and pairs of a
+    class and what rests on it somewhere.
     """
 
     def __init__(self, walk: Walk, house: House, graph: NavGraph, catalogue: Catalogue) -> None:
-        self.walk, self.house, self.graph, self.elsewhere = walk, house, graph, list[str]()
+        self.walk, self.house, self.graph = walk, house, graph
+        self.elsewhere, self.rests = list[str](), set[tuple[str, str]]()
         self.lexicon, self.assets = lexicon_of(catalogue), {p.id: catalogue.assets[p.asset] for p in house.placements}
         self.kind, self.by, self.rng = "", templates.SPEAKERS[0], np.random.default_rng(0)
+        self._called: dict[str, list[Placement]] = {}
         self.clear = _firsts(f.clear for f in walk.frames)
         self.glimpsed = _firsts([o for o, share in f.shares.items() if share >= GLIMPSE] for f in walk.frames)
         self.things = [p for p in house.placements if p.id in self.clear and p.object_class not in UNFIT]
@@ -80,6 +82,11 @@ class WalkScene:
     def shuffled(self, items: Sequence) -> list:
         return [items[i] for i in self.rng.permutation(len(items))]
 
+    def carrier_of(self, p: Placement) -> str:
+        """The class of what a thing rests on, and ' shelf' where it does on a shelf of it."""
+        shelf = " shelf" if (p.surface or "").startswith("shelf") else ""
+        return (self.house.placement_by_id[p.parent].object_class if p.parent else "") + shelf
+
     def in_room(self, room: str) -> list[Placement]:
         return [p for p in self.things if p.room == room]
 
@@ -89,13 +96,20 @@ class WalkScene:
         return nouns[0 if self.rng.random() < self.by.plainness else int(self.rng.integers(len(nouns)))]
 
     def noun(self, name: str) -> str:
-        """A noun for a class that stands for no other class, most often its own name."""
-        nouns = [n for n in self.lexicon.nouns_of[name] if self.lexicon.classes_of[n] == (name,) and plural(n) != n]
-        return name if not nouns or self.rng.random() < 0.6 else nouns[int(self.rng.integers(len(nouns)))]
+        """A noun for a class, most often its own name, that stands for no other class and fits all such things of the
+        house."""
+        there = [self.assets[p.id].synonyms for p in self.house.placements if p.object_class == name]
+        fits = lambda noun: all(noun in (*map(str.lower, own), *templates.SPOKEN.things.get(name, ())) for own in there)
+        alone = [n for n in self.lexicon.nouns_of[name] if self.lexicon.classes_of[n] == (name,) and plural(n) != n]
+        nouns = alone if self.rng.random() < 0.4 else []
+        return nouns[int(self.rng.integers(len(nouns)))] if (nouns := [*filter(fits, nouns)]) else name
 
-    def called(self, noun: str) -> list[Placement]:
-        """All of the house that somebody may take for what a noun means."""
-        return [p for p in self.house.placements if self._says(p, self.lexicon.thing(Word(noun, ())))]
+    def called(self, words: str) -> list[Placement]:
+        """All of the house that somebody may take for what words mean."""
+        if words not in self._called:
+            thing, there = self.lexicon.heard(words.split()), self.house.placements
+            self._called[words] = [p for p in there if thing and self._says(p, thing)]
+        return self._called[words]
 
     def _says(self, p: Placement, thing: Referent) -> bool:
         alike = (c for name in thing.classes for c in ALIKE.get(name, ()))
@@ -121,7 +135,8 @@ class WalkScene:
         return None
 
     def people(self, anywhere: bool = False) -> list[tuple[Placement, str]]:
-        """People who are seen clearly, with names that fit nobody else: 'the sitting woman', 'the man in the kitchen'.
+        """People who are seen clearly, with names that fit nobody else: 'the man', 'the sitting woman', 'the woman with
+        curly black hair in a green dress', 'the man in the kitchen'.
 
         Args:
           anywhere: names do not say the room.
@@ -129,17 +144,23 @@ class WalkScene:
         shown = [p for p in self.house.placements if p.object_class == CLASS and p.id in self.glimpsed]
         names: dict[str, list[str]] = {}
         for p in shown:
-            who, how = (next((w for t, w in words.items() if t in self.assets[p.id].tags), "") for words in PEOPLE)
-            there = [f"the {who} in the {self.room_name(p.room)}"] if p.room in self.rooms and not anywhere else []
-            names[p.id] = [f"the {who}", f"the {how} {who}", *there] if who and how else []
+            person, how = person_of(p.asset), "sitting" if "sitting" in self.assets[p.id].tags else "standing"
+            words = [person.noun, f"{how} {person.noun}", person.words]
+            if p.room in self.rooms and not anywhere:
+                words.append(f"{person.noun} in the {self.room_name(p.room)}")
+            names[p.id] = [f"the {w}" for w in words]
         every = [name for of_one in names.values() for name in of_one]
         alone = ((p, [n for n in names[p.id] if every.count(n) == 1]) for p in shown if p.id in self.clear)
         return self.shuffled([(p, of_one[0]) for p, of_one in alone if of_one])
 
     def meant(self, words: str) -> list[Placement]:
         """Placements that a reader takes words for, of all that the walk shows."""
-        thing = self.lexicon.heard(words.split())
-        return [q for q in self.house.placements if q.id in self.glimpsed and thing and self._says(q, thing)]
+        return [q for q in self.called(words) if q.id in self.glimpsed]
+
+
+def easily_moved(p: Placement) -> bool:
+    light = any(word in f" {p.object_class}" for word in EASILY_MOVED)
+    return light and p.parent is None and max(p.size) > LEAST_MOVED
 
 
 def _firsts(frames: Iterable[Iterable[str]]) -> dict[str, int]:

@@ -8,13 +8,14 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 import shapely
 
 from embodied.assets.moving_parts import openness_of
-from embodied.datasets.vqa.scene import ALIKE, WalkScene, bearing, direction, gap, middle
+from embodied.datasets.vqa.scene import ALIKE, WalkScene, bearing, direction, easily_moved, gap, middle
 from embodied.datasets.vqa.scoring import VqaQuestion
 from embodied.datasets.vqa.walks import CLEAR_SHARE
 from embodied.geometry import facing_of
@@ -28,8 +29,10 @@ SIDE = 15.0
 """Degrees from the border between two sides within which nothing is asked."""
 LEAST_METRES, MOST_METRES, NEARER, NEARER_METRES = 0.5, 8.0, 1.25, 0.3
 """Between things whose distance is asked for; how much farther the second nearest thing is than the nearest."""
-AJAR, BEHIND = 0.3, 110.0
-"""Openness from which a door or drawer stands open; degrees off their way from which people do not see things."""
+AJAR, BEHIND, ON_FLOOR, NEXT_TO, HALVED, TRIES = 0.3, 110.0, 0.02, 0.5, "curtain", 6
+"""Openness from which a door or drawer stands open; degrees off their way from which people do not see things; metres
+below which things stand on the floor, and within which what is not on something might be taken to be; a class whose
+halves people count; times that every thing of a room is asked about with others, since some sides are rare."""
 SUNNY, SHADY, HIGH, LATER = math.cos(math.radians(50)), math.cos(math.radians(100)), 0.15, (7.0, 9.0, 15.0, 17.0, 19.0)
 """Cosines between where a window looks and the sun, at least of a sunny room and at most of others; the least height of
 the sun, the sine; hours that are asked about."""
@@ -72,7 +75,7 @@ def counting(s: WalkScene) -> Asked:
         noun = s.noun(name)
         there = {p.id: p.object_class for p in s.called(noun) if p.room == room}
         alone = {*there.values()} == {name} and there.keys() <= s.clear.keys()
-        if 2 <= len(there) <= 12 and plural(noun) != noun and alone:
+        if 2 <= len(there) <= 12 and plural(noun) != noun and alone and name != HALVED:
             yield s.ask(str(len(there)), (room, *there), things=plural(noun), room=s.room_name(room))
 
 
@@ -102,7 +105,7 @@ def turned(sides: Sides) -> QuestionType:
     """The type that asks on which side something lies for who stands by a thing and faces another."""
 
     def asked(s: WalkScene) -> Asked:
-        for (a, first), (b, second), (c, third) in groups(s, 3, far=1.0):
+        for (a, first), (b, second), (c, third) in itertools.chain(*(groups(s, 3, far=1.0) for _ in range(TRIES))):
             angle = bearing(middle(a), direction(middle(a), middle(b)), middle(c))
             yield from sided(s, angle, sides, (a.id, b.id, c.id), a=first, b=second, c=third)
 
@@ -130,9 +133,12 @@ def visibility(s: WalkScene) -> Asked:
     shown = {i for f in s.walk.frames for i in f.shares}
     away = {n: s.noun(n) for n in sorted({*s.elsewhere} - UNFIT)}
     unseen = [n for n in s.elsewhere if n in away and not shown & {p.id for p in s.called(away[n])}]
+    often = Counter(s.elsewhere)
     for name in s.shuffled(sorted({p.object_class for p in s.things})):
-        seen = [p.id for p in s.things if p.object_class == name]
-        wrong = [away[n] for n in dict.fromkeys(s.shuffled(unseen))][:3]
+        seen, rarer = [p.id for p in s.things if p.object_class == name], int(s.rng.integers(4))
+        others = [*dict.fromkeys(s.shuffled(unseen))]
+        rare, common = ([n for n in others if (often[n] < often[name]) == is_rare] for is_rare in (True, False))
+        wrong = [away[n] for n in (*rare[:rarer], *common[: 3 - rarer])]
         if len(wrong) == 3:
             yield s.ask(s.noun(name), seen, wrong, f"first in frame {min(s.clear[i] for i in seen)}")
 
@@ -144,12 +150,15 @@ def carried(shelf: bool) -> QuestionType:
         small = [p for p in s.things if p.parent is not None]
         for carrier, name in s.named(s.things):
             classes = {p.object_class for p in s.house.placements if p.parent == carrier.id}
-            there = [p for p in small if p.parent == carrier.id and (p.surface or "").startswith("shelf") == shelf]
+            there = [p for p in small if p.parent == carrier.id and s.carrier_of(p).endswith(" shelf") == shelf]
             alike = {*classes, *(c for name in classes for c in ALIKE.get(name, ()))}
-            away = [*dict.fromkeys(s.shuffled([p.object_class for p in small if p.object_class not in alike]))]
-            for p in s.shuffled(there)[: len(away) > 2]:
+            beside = {p.object_class for p in small if gap(carrier, p) < NEXT_TO}
+            away = {p.object_class for p in small} - alike - beside
+            for p in s.shuffled(there) if len(away) > 2 else ():
+                fits = [c for c in s.shuffled(sorted(away)) if (s.carrier_of(p), c) in s.rests]
+                wrong = [*dict.fromkeys([*fits, *s.shuffled(sorted(away))])][:3]
                 fact = f"on it: {', '.join(sorted(classes))}"
-                yield s.ask(s.noun(p.object_class), (carrier.id, p.id), map(s.noun, away[:3]), fact, a=name)
+                yield s.ask(s.noun(p.object_class), (carrier.id, p.id), map(s.noun, wrong), fact, a=name)
 
     return asked
 
@@ -169,8 +178,8 @@ def change(s: WalkScene) -> Asked:
     twice = {i for f in s.walk.frames[:half] for i in f.clear} & {i for f in s.walk.frames[half:] for i in f.clear}
     others = [p for p in s.things if p.id in twice and p.id != s.walk.moved and p.parent != s.walk.moved]
     for p, name in s.named([p for p in s.things if p.id == s.walk.moved and p.id in twice]):
-        wrong = s.named([q for q in others if q.parent is None])[:3]
-        if len(wrong) == 3:
+        wrong = s.named([q for q in others if q.parent is None and q.position[2] < ON_FLOOR])[:3]
+        if wrong and easily_moved(p):
             yield s.ask(name, (p.id, *(q.id for q, _ in wrong)), [n for _, n in wrong])
 
 
@@ -208,7 +217,8 @@ def sun(s: WalkScene) -> Asked:
                 of_room[o.rooms[0]].append(float(-inward(s.house, o) @ towards[:2] / math.hypot(*towards[:2])))
         shady = [r for r, cosines in of_room.items() if max(cosines) < SHADY]
         sunny = [r for r, cosines in of_room.items() if max(cosines) > SUNNY]
-        if len(sunny) == 1 and shady and towards[2] > HIGH and s.house.sky.weather != "overcast":
+        fair = towards[2] > HIGH and s.house.sky.weather != "overcast" and abs(hour - s.house.sky.hour) > 1
+        if len(sunny) == 1 and shady and fair:
             slots = {"now": f"{s.house.sky.hour:.0f}", "hour": f"{hour:.0f}"}
             yield s.ask(s.room_name(sunny[0]), sunny, [s.room_name(r) for r in shady[:3]], **slots)
 
@@ -237,7 +247,10 @@ def route(s: WalkScene) -> Asked:
         stops = [thing for n in (way[0], *(n for n, _ in turns), way[-1]) for thing in s.named(at[n])[:1]]
         if not 1 <= len(turns) <= 2 or min(abs(angle) for _, angle in turns) < CORNER:
             continue
-        if len({t.id for t, _ in stops}) < len(turns) + 2:
+        at_things = [middle(t) for t, _ in stops]
+        seen = [bearing(b, direction(a, b), c) for a, b, c in zip(at_things, at_things[1:], at_things[2:])]
+        agree = (angle * true > 0 and STRAIGHT < abs(angle) < 180 - SIDE for angle, (_, true) in zip(seen, turns))
+        if len({t.id for t, _ in stops}) < len(turns) + 2 or not all(agree):
             continue
         names = [name for _, name in stops]
         steps = "; [fill in]; ".join(f"go forward until you reach {name}" for name in names[1:])
