@@ -48,11 +48,6 @@ class Module:
     guest: WantedRoom | None = None
     """A small room entered from the corridor that shares a column with the owned ones."""
 
-    @property
-    def area(self) -> float:
-        """Wanted area of all its rooms, square metres."""
-        return self.main.area + sum(s.area for s in self.owned) + (self.guest.area if self.guest else 0.0)
-
 
 @dataclass(frozen=True)
 class Slot:

@@ -188,8 +188,6 @@ def resampled_depth(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
 class PixelGrid:
     """Places of a picture's pixels on the padded faces."""
 
-    s: int
-    """Side of a face, pixels."""
     shape: tuple[int, int]
     """Height and width of the picture."""
     draw: Callable[[np.ndarray], None]
@@ -225,7 +223,7 @@ def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int,
     right, rows = _lens(vfov, height, width)
     columns = np.array([[cp * cy], [cp * sy], [sp]]) + np.array([[sy], [-cy], [0.0]]) * right
     rays = Rays(rows, columns.astype(np.float32), np.array([-sp * cy, -sp * sy, cp], np.float32))
-    return PixelGrid(s, (height, width), functools.partial(locate, s, rays))
+    return PixelGrid((height, width), functools.partial(locate, s, rays))
 
 
 @functools.lru_cache(maxsize=8)
@@ -245,7 +243,7 @@ def grid36(s: int, size: int) -> PixelGrid:
             view = perspective_grid.__wrapped__(s, yaw, pitch, VFOV36, size, size)
             view.draw(maps[:, k * size : (k + 1) * size])
 
-    return PixelGrid(s, (VIEWS * size, size), draw)
+    return PixelGrid((VIEWS * size, size), draw)
 
 
 @functools.lru_cache(maxsize=4)
@@ -256,7 +254,7 @@ def equirect_grid(s: int, height: int) -> PixelGrid:
     rows = np.stack([np.cos(pitch), np.sin(pitch)]).astype(np.float32)
     columns = np.stack([np.cos(yaw), np.sin(yaw), np.zeros(2 * height)]).astype(np.float32)
     rays = Rays(rows, columns, np.array([0, 0, 1], np.float32))
-    return PixelGrid(s, (height, 2 * height), functools.partial(locate, s, rays))
+    return PixelGrid((height, 2 * height), functools.partial(locate, s, rays))
 
 
 @functools.lru_cache(maxsize=8)

@@ -100,7 +100,6 @@ class Wall:
     Positions on it are measured from `start` along `along`, metres.
     """
 
-    index: int
     start: tuple[float, float]
     along: tuple[float, float]
     inward: tuple[float, float]
@@ -173,7 +172,6 @@ class RoomSpace:
     ceiling: shapely.Geometry
     """`polygon`, without the opening of stairs that lead up."""
     walls: tuple[Wall, ...]
-    openings: tuple[Opening, ...]
     entries: tuple[tuple[float, float], ...]
     """Spots where one stands after each door, metres."""
     keepouts: tuple[Box, ...]
@@ -349,7 +347,6 @@ def room_space(house: House, room: Room) -> RoomSpace:
         polygon=floor,
         ceiling=floor.difference(shapely.union_all(wells)) if wells else floor,
         walls=walls,
-        openings=openings,
         entries=tuple(entries),
         keepouts=(*keepouts, *flights),
         radius=radius,
@@ -409,7 +406,6 @@ def _walls(floor: shapely.Polygon, openings: Sequence[Opening], thickness: float
         holes.sort(key=lambda f: (f[0], f[2].id))
         walls.append(
             Wall(
-                index=i,
                 start=(float(ring[i][0]), float(ring[i][1])),
                 along=(float(along[0]), float(along[1])),
                 inward=(float(inward[0]), float(inward[1])),
