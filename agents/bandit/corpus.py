@@ -91,22 +91,18 @@ def split(pairs: Sequence[Pair], sizes: Sizes, *, seed: int) -> dict[str, list[P
     rng = stream(seed, "corpus", "documents")
     order = iter([names[i] for i in rng.permutation(len(names))])
     pairs_by_document: dict[str, list[Pair]] = {}
-    for name, wanted in (
-        ("test", sizes.test),
-        ("dev", sizes.dev),
-        ("supervised", sizes.supervised),
-        ("bandit_disjoint", sizes.bandit),
-    ):
+    wanted = {"test": sizes.test, "dev": sizes.dev, "supervised": sizes.supervised, "bandit_disjoint": sizes.bandit}
+    for name, count in wanted.items():
         pairs_by_document[name] = []
-        while len(pairs_by_document[name]) < wanted:
+        while len(pairs_by_document[name]) < count:
             document = next(order, None)
             if document is None:
                 raise CorpusError(
                     f"{len(pairs)} pairs in {len(names)} documents are too few for {sizes}; ask for smaller splits"
                 )
             pairs_by_document[name] += documents[document]
-    for name, wanted in (("supervised", sizes.supervised), ("bandit_disjoint", sizes.bandit)):
-        pairs_by_document[name] = pairs_by_document[name][:wanted]
+    for name in ("supervised", "bandit_disjoint"):
+        pairs_by_document[name] = pairs_by_document[name][: wanted[name]]
     known = min(round(sizes.overlap * sizes.bandit), sizes.supervised)
     rng = stream(seed, "corpus", "overlap")
     chosen = [pairs_by_document["supervised"][i] for i in sorted(rng.permutation(sizes.supervised)[:known])]

@@ -1,14 +1,16 @@
-"""Houses at a moment with five movers each, and what a path tracer shows of them."""
+"""Houses at a moment with five movers each, and what a path tracer shows of them; and pictures of the people of lit
+houses, as those see them who meet them."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
+import cv2
 import mujoco
 import numpy as np
 import shapely
@@ -17,6 +19,7 @@ from embodied.assets.catalogue import Catalogue
 from embodied.assets.records import Finish, MeshPart
 from embodied.bench.light import VIEW_ANGLE
 from embodied.generate import HouseConfig, generate_house
+from embodied.generate.people import add_people, place_people
 from embodied.geometry import rotation
 from embodied.house.house import House, Placement
 from embodied.house.moment import Moment, RigidPose
@@ -32,7 +35,7 @@ from embodied.scene.bodies import body_parts, body_poses
 from embodied.scene.house_meshes import house_parts
 from embodied.scene.part import Part
 from embodied.seeds import stream
-from embodied.world import gloss_of
+from embodied.world import gloss_of, open_world
 
 MOVING_HOURS = (
     *((10.0, "clear"), (13.0, "overcast"), (16.5, "clear"), (21.5, "clear")),
@@ -236,3 +239,38 @@ def _places(camera: Camera, depth: np.ndarray) -> np.ndarray:
     x, y = ((np.arange(w) + 0.5) / w * 2 - 1) * t * w / h, (1 - (np.arange(h) + 0.5) / h * 2) * t
     across, up = x[None, :, None] * camera.right, y[:, None, None] * np.array(camera.up)
     return np.array(camera.position) + far * (np.array(camera.forward) + across + up)
+
+
+PEOPLE_HOUSES, PEOPLE_AREA = 6, (44.0, 60.0)
+"""Houses, and their square metres."""
+CROP, CROP_ANGLE = (400, 300), math.radians(66)
+"""Height and width of a picture, pixels, and its vertical field of view."""
+ROW = 6
+
+
+def people_pictures(
+    catalogue: Catalogue, cache: Path, out: Path, *, seed: int, progress: Callable[[str], None]
+) -> dict[str, object]:
+    """Draws everybody whom one meets in six houses from where one meets them: out/people/K_ID.png, and a sheet."""
+    folder, crops = out / "people", []
+    folder.mkdir(parents=True, exist_ok=True)
+    for k in range(PEOPLE_HOUSES):
+        hour, weather = MOVING_HOURS[k]
+        house = generate_house(seed + k, HouseConfig(area=PEOPLE_AREA, hour=hour, weather=weather), catalogue)
+        graph = build_graph(house)
+        met = place_people(house, graph, catalogue, seed=seed)
+        house = add_people(house, met, met)
+        with open_world(house, catalogue, cache, pictures="fast") as world:
+            for person in (p for p in house.placements if p.object_class == "person"):
+                node = next(n for n in met if met[n].position == person.position)
+                eye = graph.positions[node]
+                x, y, z = np.array([*person.position[:2], person.position[2] + 0.72 * person.size[2]]) - eye
+                yaw, pitch = math.atan2(y, x), math.atan2(z, math.hypot(x, y))
+                rgb = world.renderer.view(eye, yaw, pitch, CROP_ANGLE, CROP).rgb
+                cv2.imwrite(str(folder / f"{k}_{person.id}.png"), rgb[..., ::-1])
+                crops.append(rgb)
+        progress(f"house {k + 1} of {PEOPLE_HOUSES}: {len(crops)} people so far")
+    crops += [np.zeros_like(crops[0])] * (-len(crops) % ROW)
+    sheet = np.vstack([np.hstack(crops[i : i + ROW]) for i in range(0, len(crops), ROW)])
+    cv2.imwrite(str(out / "people.png"), sheet[..., ::-1])
+    return {"sheet": str(out / "people.png"), "people": len(list(folder.glob("*.png")))}

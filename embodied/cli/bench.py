@@ -73,7 +73,7 @@ def run(args: BenchOptions) -> None:
         facts["moving"] = moving.compare(catalogue, args.cache, args.out, seed=args.seed, progress=note)
         texts.append(moving.table(facts["moving"]))
     if "people" in parts:
-        from embodied.bench.people import people_pictures  # late: loads the generator and MuJoCo
+        from embodied.bench.moments import people_pictures  # late: loads the generator and MuJoCo
 
         facts["people"] = people_pictures(catalogue, args.cache, args.out, seed=args.seed, progress=note)
         texts.append(f"{facts['people']['people']} people: {facts['people']['sheet']}")

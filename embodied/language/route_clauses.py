@@ -240,11 +240,8 @@ def _passing(telling: _Telling, nodes: Sequence[int]) -> list[Phrase]:
         ahead = next(w.yaw for w in eyes.at(a).ways if w.node == b)
         for t in seen.things:
             bearing = float(wrap(t.yaw - ahead))
-            if (
-                t.distance <= PASSING_DISTANCE - 0.4
-                and math.radians(40) < abs(bearing) < math.radians(150)
-                and t.placement not in used
-            ):
+            aside = math.radians(40) < abs(bearing) < math.radians(150)
+            if aside and t.distance <= PASSING_DISTANCE - 0.4 and t.placement not in used:
                 beside.setdefault(t.placement, (t, meaning.LEFT if bearing > 0 else meaning.RIGHT, eyes.at(a)))
     for thing in _ranked([t for t, _, _ in beside.values()], telling.rng):
         _, side, before = beside[thing.placement]
