@@ -13,6 +13,7 @@ import pytest
 from conftest import two_rooms
 from hand_chat import ChatServer, first_allowed
 
+from embodied.agents.vision.answers import strip_of_frames
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.people.figures import person_of
 from embodied.cli import main
@@ -151,6 +152,12 @@ def test_no_more_is_left_out_than_a_model_guesses():
     most = np.arange(100) < 60
     kept = [int(q.id) for q in less_guessed(asked, most.astype(float), sure)]
     assert np.mean(most[kept]) <= 0.53 and 80 < len(kept) < 90 and {*range(60, 100)} <= {*kept}
+
+
+def test_a_look_around_becomes_a_strip_whose_middle_is_the_first_frame():
+    strip = strip_of_frames([np.full((360, 480, 3), k, np.uint8) for k in range(12)])
+    turns = np.repeat([6, 5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7], 48)  # what is to the left is seen later
+    assert (strip == np.roll(turns, -24)[None, :, None]).all()
 
 
 def test_people_are_told_apart_by_how_they_look():

@@ -29,6 +29,7 @@ def make(args: DatasetOptions) -> None:
     """`embodied dataset vqa`."""
     from tqdm import tqdm
 
+    from embodied.agents.vision.answers import guessed
     from embodied.datasets.vqa.build import VqaConfig, build_vqa
     from embodied.evaluation.evaluate import read_seeds
 
@@ -43,16 +44,17 @@ def make(args: DatasetOptions) -> None:
     check_machine(pictures)
     watch = lambda jobs, total: tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
     config = VqaConfig(houses, questions, args.seed, args.area, pictures, seeds)
-    about = build_vqa(config, args.out, args.cache, workers=args.workers, watch=watch).about
+    about = build_vqa(config, args.out, args.cache, guessed, workers=args.workers, watch=watch).about
     lines = [f"{split}: {sum(c.values())} questions of {len(c)} types" for split, c in about["counts"].items()]
     show(args, {"folder": str(args.out), **about}, "\n".join([*lines, f"digest {about['digest'][:16]}, in {args.out}"]))
 
 
 def evaluate(args: EvaluateOptions) -> None:
-    """`embodied evaluate vqa`: a row for every type, a column for every agent."""
+    """`embodied evaluate vqa`: a row for every type (and split), a column for every agent, the judge less its twin."""
     from embodied.assets.cache import write_bytes, write_json
     from embodied.datasets.vqa.build import VqaData
     from embodied.datasets.vqa.scoring import BLIND, chance, cross_judged, score
+    from embodied.evaluation.tables import Estimate, Samples, interval, less
     from embodied.records import save_lines
 
     if args.data is None:
@@ -62,22 +64,24 @@ def evaluate(args: EvaluateOptions) -> None:
             f"unknown agents {unknown}; questions are answered by llm, judge and blind (models without sight)"
         )
     data = VqaData(args.data)
-    splits = args.split or [[*data.about["counts"]][-1]]
-    questions = [q for split in splits for q in data.questions(split)]
-    questions = questions[:: -(-len(questions) // args.tasks)] if args.tasks else questions
-    of = {t: [q for q in questions if q.type == t] for t in dict.fromkeys(q.type for q in questions)}
-    columns = {"chance": [chance(qs) for qs in of.values()]}
-    if "blind" in (args.agent or ("blind",)):
-        every = [q for name in data.about["counts"] for q in data.questions(name)]
-        for model in BLIND:
-            judged_by_id = {}
-            for t in of:
-                known = [q for q in every if q.type == t]
-                judged_by_id |= zip((q.id for q in known), cross_judged(model, known, args.seed + 1)[0].tolist())
-            columns[model] = [sum(judged_by_id[q.id] for q in qs) / len(qs) for qs in of.values()]
+    splits, every = args.split or [[*data.about["counts"]][-1]], [*map(data.questions, data.about["counts"])]
+    asked = [(f"{t}, {s}" if len(splits) > 1 else t, q) for s in splits for q in data.questions(s) for t in (q.type,)]
+    asked = asked[:: -(-len(asked) // args.tasks)] if args.tasks else asked
+    questions = [q for _, q in asked]
+    of = {t: [q for name, q in asked if name == t] for t in dict.fromkeys(name for name, _ in asked)}
     mean_of = lambda scores: [sum(scores[q.id] for q in qs) / len(qs) for qs in of.values()]
-    for name, answers in judged(args, data, questions) if "judge" in args.agent else ():
-        columns[name] = mean_of({q.id: score(q, a) for q, a in zip(questions, answers, strict=True)})
+    columns, gains = {"chance": [chance(qs) for qs in of.values()]}, list[Estimate]()
+    if "blind" in (args.agent or ("blind",)):
+        known = [[q for qs in every for q in qs if q.type == t] for t in sorted({q.type for q in questions})]
+        cross = lambda m, qs: zip((q.id for q in qs), cross_judged(m, qs, args.seed + 1)[0].tolist(), strict=True)
+        of_blind = lambda m: dict(pair for qs in known for pair in cross(m, qs))
+        columns |= {m: mean_of(of_blind(m)) for m in BLIND}
+    if "judge" in args.agent:
+        means = [{q.id: score(q, answers[q.id]) for q in questions} for answers in judged(args, data, questions)]
+        columns |= {"judge": mean_of(means[0]), "judge, blind": mean_of(means[1])}
+        for qs in (*of.values(), questions):
+            houses = tuple(q.walk.rpartition("_")[0] for q in qs)
+            gains.append(interval([less(*(Samples(tuple(x[q.id] for q in qs), houses) for x in means))]))
     if "llm" in args.agent:
         answers = [*bar(answered(args, data, questions), "questions", "question", len(questions))]
         scores = {q.id: score(q, answer) for q, answer in zip(questions, answers, strict=True)}
@@ -85,30 +89,38 @@ def evaluate(args: EvaluateOptions) -> None:
         if args.out:
             records = ({"id": q.id, "said": a, "score": scores[q.id]} for q, a in zip(questions, answers))
             save_lines(args.out / "answers.jsonl", records)
-    rows = [(t, len(qs), values) for (t, qs), *values in zip(of.items(), *columns.values())]
-    rows.append(("mean of types", len(questions), [sum(c) / len(c) for c in columns.values()]))
-    table = f"| type | n | {' | '.join(columns)} |\n|---|{'---|' * (len(columns) + 1)}\n"
-    table += "".join(f"| {t} | {n} | {' | '.join(f'{100 * v:.1f}' for v in values)} |\n" for t, n, values in rows)
+    cells = [[f"{100 * v:.1f}" for v in (*c, sum(c) / len(c))] for c in columns.values()]
+    cells += [[f"{100 * e.mean:+.1f} ± {100 * e.half:.1f}" for e in gains]] if gains else []
+    heads = ["type", "n", *columns, *["sight"] * bool(gains)]
+    labels = [*((t, len(qs)) for t, qs in of.items()), ("mean of types", len(questions))]
+    rows = [heads, ["---"] * len(heads), *([t, str(n), *row] for (t, n), *row in zip(labels, *cells, strict=True))]
+    table = "".join(f"| {' | '.join(row)} |\n" for row in rows)
     facts = {"data": data.about["digest"], "split": splits, "types": [*of], "scores": columns}
+    facts |= {"sight": [[e.mean, e.half] for e in gains]}
     if args.out:
         write_bytes(args.out / "table.md", table.encode())
         write_json(args.out / "table.json", facts, indent=1)
     show(args, facts, table)
 
 
-def judged(args: EvaluateOptions, data: VqaData, asked: Sequence[VqaQuestion]) -> Iterator[tuple[str, list[str]]]:
-    """Answers of a network that learns from the train split, and of its twin that sees black frames."""
-    from embodied.agents.vision.answers import answers_of, frame_features
+def judged(args: EvaluateOptions, data: VqaData, asked: Sequence[VqaQuestion]) -> list[dict[str, str]]:
+    """Answers of a network that learns from train (asked about, too: from other houses), and of its blind twin."""
+    from embodied.agents.vision.answers import Eyes, answers_of
+    from embodied.assets.catalogue import load_catalogue
+    from embodied.datasets.vqa.scoring import folds
 
-    learned = data.questions("train")
-    if shared := {q.walk for q in learned} & {q.walk for q in asked}:
-        raise ValueError(
-            f"the judge learns from the split train, which shows {sorted(shared)[0]} too; judge another split"
-        )
-    walks = sorted({q.walk for q in (*learned, *asked)})
-    seen = frame_features(data.frames, bar(walks, "frames", "walk", len(walks)))
-    for name, frames in {"judge": seen, "judge, blind": {w: x * 0 for w, x in seen.items()}}.items():
-        yield name, answers_of(learned, asked, frames, seed=args.seed)
+    learned, of = data.questions("train"), folds(asked, args.seed)
+    known = {q.walk for q in learned} & {q.walk for q in asked}
+    walks, answers_by = sorted({q.walk for q in (*learned, *asked)}), [dict[str, str](), dict[str, str]()]
+    eyes = Eyes(data, bar(walks, "frames", "walk", len(walks)), load_catalogue(args.cache))
+    for fold in sorted({*of.tolist()}) if known else [None]:
+        part = [q for q, k in zip(asked, of) if fold in (None, k)]
+        others = [q for q, k in zip(asked, of) if k != fold] if known else learned
+        eyes.learn(q.walk for q in others)
+        seen = {q.id: eyes.facts(q) for q in (*others, *part)}
+        for answers, facts in zip(answers_by, (seen, {k: x * 0 for k, x in seen.items()})):
+            answers |= zip((q.id for q in part), answers_of(others, part, facts, seed=args.seed))
+    return answers_by
 
 
 def answered(args: EvaluateOptions, data: VqaData, questions: Sequence[VqaQuestion]) -> Iterator[str]:

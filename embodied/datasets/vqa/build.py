@@ -6,7 +6,7 @@ import dataclasses
 import itertools
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.datasets.build import Watch, for_each_unit, make_dataset_house
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.vqa.scene import WalkScene, easily_moved
-from embodied.datasets.vqa.scoring import VqaQuestion, thinned
+from embodied.datasets.vqa.scoring import VqaQuestion, less_guessed, thinned
 from embodied.datasets.vqa.types import CHANGE, TYPES
 from embodied.datasets.vqa.walks import Walk, cameras, film, look_around, tour, view_of
 from embodied.generate import HouseConfig
@@ -42,6 +42,9 @@ wanted that are drawn; people who ask."""
 MOVED_BY = 1.0
 """How far something is moved between two visits, and ends from the camera, metres."""
 
+Judge = Callable[[Sequence[VqaQuestion], int], np.ndarray]
+"""A further blind model, of all types together: questions and a seed to (2, n) scores and how sure it is."""
+
 
 @dataclass(frozen=True)
 class VqaConfig:
@@ -56,7 +59,9 @@ class VqaConfig:
     seeds: tuple[int, ...] = ()
 
 
-def build_vqa(config: VqaConfig, folder: Path, cache: Path, *, workers: int = 1, watch: Watch | None = None) -> VqaData:
+def build_vqa(
+    config: VqaConfig, folder: Path, cache: Path, network: Judge, *, workers: int = 1, watch: Watch | None = None
+) -> VqaData:
     """Film what is missing, ask, and write vqa.json last; the same command goes on after an interruption.
 
     Raises:
@@ -72,7 +77,7 @@ def build_vqa(config: VqaConfig, folder: Path, cache: Path, *, workers: int = 1,
         for_each_unit(film_house, names, (config, folder, cache), workers=workers, watch=watch)
         for split, n in config.houses.items():
             every[split] = ask(config, scenes_of(folder, split, n, cache), config.questions[split], workers)
-        unguessed(config, every, workers)
+        unguessed(config, every, network, workers)
         for split, questions in every.items():
             save_lines(folder / f"questions_{split}.jsonl", questions)
         counts = {split: Counter(q.type for q in questions) for split, questions in every.items()}
@@ -161,12 +166,15 @@ def ask(config: VqaConfig, scenes: Sequence[WalkScene], wanted: int, workers: in
     return [q for part in parts for q in part]
 
 
-def unguessed(config: VqaConfig, left: dict[str, list[VqaQuestion]], workers: int) -> None:
+def unguessed(config: VqaConfig, left: dict[str, list[VqaQuestion]], network: Judge, workers: int) -> None:
     """Leave out what blind models guess that know the questions about other houses; keep as many of each type as there
     are, up to a number that all types of a split share."""
-    for _ in range(2):  # what is left out may keep models from guessing the rest
+    for judge in (network, network, None):  # what is left out may keep models from guessing the rest
         of_type = [[q for questions in left.values() for q in questions if q.type == name] for name in TYPES]
         kept = joblib.Parallel(n_jobs=workers)(joblib.delayed(thinned)(qs, config.seed) for qs in of_type)
+        if judge:
+            of_id = dict(zip((q.id for qs in kept for q in qs), judge([q for qs in kept for q in qs], config.seed).T))
+            kept = [less_guessed(qs, *np.array([of_id[q.id] for q in qs]).T) for qs in kept if qs]
         for split in left:
             own, most = [[q for q in qs if q.walk.startswith(f"{split}_")] for qs in kept], config.questions[split]
             level = max(n for n in range(max(map(len, own)) + 1) if sum(min(len(qs), n) for qs in own) <= most)

@@ -146,8 +146,7 @@ class WalkScene:
         for p in shown:
             person, how = person_of(p.asset), "sitting" if "sitting" in self.assets[p.id].tags else "standing"
             words = [person.noun, f"{how} {person.noun}", person.words]
-            if p.room in self.rooms and not anywhere:
-                words.append(f"{person.noun} in the {self.room_name(p.room)}")
+            words += [f"{person.noun} in the {self.room_name(p.room)}"] if p.room in self.rooms and not anywhere else []
             names[p.id] = [f"the {w}" for w in words]
         every = [name for of_one in names.values() for name in of_one]
         alone = ((p, [n for n in names[p.id] if every.count(n) == 1]) for p in shown if p.id in self.clear)
