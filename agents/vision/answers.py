@@ -37,8 +37,7 @@ SIZE, WORDS, EPOCHS, BATCH, RATE, DECAY, DROPOUT = 64, 2**12, 12, 64, 2e-3, 0.05
 
 
 class LookAround(NamedTuple):
-    """Finds of the detector around a spot, in cells of a strip whose middle looks along `yaw` (world, radians), from
-    `frame`, a share of the walk: float16 probabilities of classes (C, 12, 36), and features of cells (D, 12, 36)."""
+    """Probabilities of classes and features in (12, 36) cells of a strip along `yaw`; `frame` is a share of the walk."""
 
     position: np.ndarray
     yaw: float
@@ -132,8 +131,7 @@ class Eyes:
             later = max(to_left % math.tau / TURN - 1, 0) if to_left % math.tau < FRAMES_AROUND * TURN - TURN else 0
             seen = stops[k].frame + later / (2 * FRAMES_AROUND * len(stops)) if most[k] > THERE else seen
         near = np.stack([cv2.dilate(s, np.ones((3, 3), np.uint8)) for s in sure])
-        peaks = ((sure == near) & (sure > THERE)).sum((1, 2))
-        k = int(most.argmax())
+        peaks, k = ((sure == near) & (sure > THERE)).sum((1, 2)), int(most.argmax())
         facts = [seen, most.max(), most.mean(), peaks.max() / 4, peaks.sum() / 8, sure.sum((1, 2)).max() / 8]
         facts += [float(divmod(best[k], encoder.STRIP_COLUMNS)[0]), logs[k], math.log(sure[k].sum() + 0.1)]
         return FoundThing(sure, near, np.array(spots), np.array(facts))
@@ -207,9 +205,8 @@ def answers_of(
     numbers = {q.type for q in learned if not q.options}
     logs = {t: np.log([float(q.answer) for q in learned if q.type == t]) for t in numbers}
     scale = {t: (float(x.mean()), float(x.std()) + 1e-6) for t, x in logs.items()}
-    known = torch.cat([facts[q.id] for q in learned])
-    usual, spread = known.mean(0), known.std(0) + 1e-4
-    facts = {k: ((x - usual) / spread).clamp(-4, 4) for k, x in facts.items()}
+    spread, usual = torch.std_mean(known := torch.cat([facts[q.id] for q in learned]), 0)
+    facts = {k: ((x - usual) / (spread + 1e-4)).clamp(-4, 4) for k, x in facts.items()}
     with seeded(seed):
         network, rng = AnswerNetwork(known.shape[1]), stream(seed, "answers")
         optimizer = torch.optim.AdamW(network.parameters(), RATE, weight_decay=DECAY)
@@ -226,8 +223,7 @@ def answers_of(
             optimizer.step()
     network.eval()
     with torch.no_grad():
-        parts = [(group, network(group, facts).numpy()) for group in _groups(asked, BATCH)]
-    rows = {q.id: row for group, part in parts for q, row in zip(group, part, strict=True)}
+        rows = {q.id: r for g in _groups(asked, BATCH) for q, r in zip(g, network(g, facts).numpy(), strict=True)}
     number = lambda row, mean=0.0, off=1.0: f"{math.exp(mean + off * row[0]):.2f}"
     say = lambda q, row: LETTERS[int(row.argmax())] if q.options else number(row, *scale.get(q.type, ()))
     return [say(q, rows[q.id]) for q in asked]
