@@ -37,7 +37,7 @@ SIZE, WORDS, EPOCHS, BATCH, RATE, DECAY, DROPOUT = 64, 2**12, 12, 64, 2e-3, 0.05
 
 
 class LookAround(NamedTuple):
-    """Probabilities of classes and features in (12, 36) cells of a strip along `yaw`; `frame` is a share of the walk."""
+    """Probabilities of classes and features in (12, 36) cells of a strip along `yaw`; `frame`: share of the walk."""
 
     position: np.ndarray
     yaw: float

@@ -74,8 +74,7 @@ def evaluate(args: EvaluateOptions) -> None:
     if "blind" in (args.agent or ("blind",)):
         known = [[q for qs in every for q in qs if q.type == t] for t in sorted({q.type for q in questions})]
         cross = lambda m, qs: zip((q.id for q in qs), cross_judged(m, qs, args.seed + 1)[0].tolist(), strict=True)
-        of_blind = lambda m: dict(pair for qs in known for pair in cross(m, qs))
-        columns |= {m: mean_of(of_blind(m)) for m in BLIND}
+        columns |= {m: mean_of(dict(pair for qs in known for pair in cross(m, qs))) for m in BLIND}
     if "judge" in args.agent:
         means = [{q.id: score(q, answers[q.id]) for q in questions} for answers in judged(args, data, questions)]
         columns |= {"judge": mean_of(means[0]), "judge, blind": mean_of(means[1])}
