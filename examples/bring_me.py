@@ -26,7 +26,7 @@ from embodied.agents.language_models.client import AnswerCache, Client, ServerSe
 from embodied.datasets.lerobot import STEP_COLUMNS, Writer, whole_folder
 from embodied.gym.bring import BringEnv
 from embodied.gym.drive import chosen_worlds
-from embodied.gym.robot import CONTROL, RobotSettings
+from embodied.gym.robot import CONTROL, OPENED, RobotSettings
 from embodied.interface import Action, Actions, Ask, Intention, Move, Observation, Observations, Policy, Rngs, Stop
 from embodied.seeds import stream
 
@@ -135,8 +135,10 @@ def episode(skills: Skills, agent: Policy | None, seed: int) -> dict[str, Any]:
     """Facts of an episode."""
     o, memory = skills.reset(seed), None
     goal = skills.env.goal
-    for words in () if agent else (*[f"open {goal.part}"] * bool(goal.part), f"take {goal.thing}", "give"):
-        skills.do(words)
+    while agent is None and not skills.over:
+        if goal.part and skills.env.openness[goal.part] < OPENED:
+            skills.do(f"open {goal.part}")
+        skills.do("give" if skills.env.holds or skills.do(f"take {goal.thing}").startswith("you hold") else "leave")
     while agent is not None and o is not None:
         [action], memory = agent.act([o], memory, rngs=[stream(seed, "skills", skills.time)])
         o = skills.step(action or Stop())

@@ -26,8 +26,8 @@ from embodied.seeds import stream
 from embodied.tasks.ask import look_of
 
 HANDED, HIDDEN, STAYS = 0.7, 0.3, 20.0
-"""Metres from the person at which a thing is handed over; share of the things behind a closed door of furniture; and
-seconds after which the person goes to another place."""
+"""Metres from the person at which a thing is handed over; chance that a thing is put behind a closed door of furniture;
+and seconds after which the person goes to another place."""
 HOT = ("washing_machine", "tumble_dryer", "cooker")
 """Furniture in which nothing is hidden."""
 
