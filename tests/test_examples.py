@@ -118,3 +118,16 @@ def test_a_learner_outside_the_tree_is_trained_evaluated_and_studied(tmp_path, m
     assert main(["study", "my_learner:LEARNER", *common, "--out", str(tmp_path / "out"), "--seeds", "1"]) == 0
     assert "| 10 walks |" in capsys.readouterr().out
     assert main(["train", "my_learner:NOBODY"]) == 2 and "my_learner" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_agents_among_people_are_trained_and_judged(run, tmp_path, monkeypatch):
+    pytest.importorskip("stable_baselines3")
+    live_among_boxes(monkeypatch)
+    run(
+        "social_navigation.py",
+        *["--flats", "1", "--unseen", "1", "--imitate", "60", "--steps", "1", "--judge", "1", "--out", "out"],
+    )
+    for kind, last in (("social", "PPO, out"), ("follow", "knows where the person is")):
+        table = json.loads((tmp_path / "out" / f"social-{kind}.json").read_text())
+        assert table["rows"][-1]["label"] == last and {c["key"] for c in table["columns"]} >= {"success"}
