@@ -64,8 +64,8 @@ AREA = (50.0, 75.0)
 """Size of the flats, square metres."""
 ROWS, COLUMNS, TALL, EYE, FAR = 3, 32, math.radians(18.0), 1.0, 8.0
 """Of the camera: rays, radians of its height, metres above the floor, and metres beyond which all looks the same."""
-SEEN = 3
-"""Pictures that are seen at once."""
+SEEN, NEAR = 3, 0.27
+"""Pictures that are seen at once; metres to the goal from which an agent that learns, or moves at random, stops."""
 ACTIONS = (HabitatAction.FORWARD, HabitatAction.LEFT, HabitatAction.RIGHT)
 Agent = Callable[[], int]
 LOOK_AHEAD, MARGIN, TIME = 8, 0.1, 2.5
@@ -211,7 +211,7 @@ class Seeing(gymnasium.Wrapper):
         return self.seen(observation), info
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        near = self._goal[0] < 0.9 * self.env.play.episode.radius
+        near = self._goal[0] < NEAR
         observation, *rest = self.env.step(HabitatAction.STOP if near else ACTIONS[int(action)])
         return self.seen(observation, int(action)), *rest
 
@@ -336,7 +336,7 @@ def learned(weights: Path, rays: dict[str, Rays], blind: bool) -> Callable[[Cont
             nonlocal last
             seen = eyes.seen(env.look(), last)
             last = int(policy.predict(seen, deterministic=False)[0])
-            return HabitatAction.STOP if eyes._goal[0] < 0.9 * env.play.episode.radius else ACTIONS[last]
+            return HabitatAction.STOP if eyes._goal[0] < NEAR else ACTIONS[last]
 
         return act
 
@@ -344,8 +344,10 @@ def learned(weights: Path, rays: dict[str, Rays], blind: bool) -> Callable[[Cont
 
 
 def at_random(env: ContinuousGymEnv) -> Agent:
-    rng = np.random.default_rng(env.np_random.integers(2**31))
-    return lambda: int(rng.choice(ACTIONS))
+    """Moves at random, and stops where PPO does."""
+    rng, play = np.random.default_rng(env.np_random.integers(2**31)), env.play
+    there = lambda: not play.episode.follows and math.dist(play.position, play.episode.goals[0].position[:2]) < NEAR
+    return lambda: HabitatAction.STOP if there() else int(rng.choice(ACTIONS))
 
 
 TITLES = {
