@@ -17,7 +17,7 @@ from embodied.assets.cache import default_cache, digest
 from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.assets.decoding import load_record, save_record
-from embodied.generate.contents import contents, stocked
+from embodied.generate.contents import stocked
 from embodied.house.house import HINGED, House
 from embodied.house.moment import Moment, RigidPose, apart
 from embodied.house.validation import load_lit_house
@@ -646,8 +646,7 @@ def scene_spec(
     world = house if isinstance(house, World) else open_world(house, catalogue, cache, pictures or Unlit())
     free, lit = model.takeable(world.house, world.catalogue), world.lit if pictures else None
     parts = None if pictures else ()
-    lying = contents(world.house, world.catalogue, hidden=True) if pictures else ()
-    spec = model.build_spec(world.house, world.catalogue, free=free, lit=lit, hinged=True, parts=parts, contents=lying)
+    spec = model.build_spec(world.house, world.catalogue, free=free, lit=lit, hinged=True, parts=parts)
     spec.add_text(name=robots.HOUSE, data=world.house.to_json())
     return spec
 

@@ -23,7 +23,7 @@ from embodied.agents.find.network import SeekNetwork
 from embodied.agents.hanna.topological_map import SAME_PLACE, matches
 from embodied.agents.vision.features import FeatureBank
 from embodied.geometry import wrap
-from embodied.interface import Action, Actions, Move, Observation, Observations, Rngs, Situation, Situations, Stop
+from embodied.interface import Action, Actions, Move, Observation, Observations, Open, Rngs, Situation, Situations, Stop
 from embodied.policies.baselines import fewest_moves
 
 ALIKE = 0.05
@@ -73,6 +73,8 @@ class WayMap:
           panorama: (36, D) features, by which a spot is known again; zeros are never known.
         """
         ways = directions(o)
+        if self.spots and self._begun is None:  # it has opened a door
+            return False
         known = self._known(panorama, ways)
         new = known is None
         if known is None:
@@ -230,11 +232,13 @@ class FindPolicy:
             way = towards
         elif way == STOP:
             return Stop()
-        else:
+        turned = directions(o) - search.map.spots[search.map.here].ways[way]
+        if (chosen := int(np.cos(turned).argmax())) in o.can_open:
+            return Open(chosen)
+        if towards is None:
             search.plan = None
         search.map.leave(way)
-        turned = directions(o) - search.map.spots[search.map.here].ways[way]
-        return Move(int(np.cos(turned).argmax()))
+        return Move(chosen)
 
     def _decide(
         self,

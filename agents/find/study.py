@@ -41,12 +41,13 @@ from embodied.datasets.store import Dataset, SplitData
 from embodied.evaluation.evaluate import play
 from embodied.interface import STEP, TURNS, VIEWS, FindObject, Place, Pose, Sight, Task
 from embodied.kinds import metrics
+from embodied.kinds.shipped.doors import CONFIG, SHARE
 from embodied.kinds.shipped.find import FIND
 from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage
 from embodied.records import Identity, identity_of
 from embodied.seeds import stream
-from embodied.tasks.goals import find_pool, find_task
+from embodied.tasks.goals import FindConfig, find_pool, find_task, with_closed_doors
 
 SINGLE_VIEWS = 0.75
 """Share of the updates, at the start, that train only the heads that read single views (later: DAgger, too)."""
@@ -62,13 +63,17 @@ BARS, PATIENCES = (-2.0, -1.0, 0.0, 1.0), (0.1, 0.3, 1.0)
 """Values among which the explorer's bar and patience are chosen, in validation houses."""
 
 
-def tasks_in(places: Mapping[str, Place], per_house: int, things: Collection[str] = THINGS) -> list[Task]:
-    """At most so many find tasks of each house, all for one of `things`."""
-    language, fitting_tasks = PlainLanguage(), []
+def tasks_in(
+    places: Mapping[str, Place], per_house: int, things: Collection[str] = THINGS, kind: str = "find"
+) -> list[Task]:
+    """At most so many find tasks of each house, all for one of `things`; of the kind 'doors' with doors closed."""
+    language, fitting_tasks = PlainLanguage(), list[Task]()
+    config, share = (CONFIG, SHARE) if kind == CONFIG.kind else (FindConfig(), 0.0)
     for place in places.values():
-        pool = find_pool(place, seed=0)
+        pool = find_pool(place, seed=0, config=config)
         fitting = [k for k, (c, _) in enumerate(pool.pairs) if pool.classes[c].object_class in things]
-        fitting_tasks += [find_task(pool, k, seed=0, language=language) for k in fitting[:per_house]]
+        tasks = (find_task(pool, k, seed=0, language=language, config=config) for k in fitting[:per_house])
+        fitting_tasks += [with_closed_doors(t, place, share, seed=0) for t in tasks]
     return fitting_tasks
 
 
@@ -273,7 +278,9 @@ class FindStudy(SightedStudy):
     judges = (*JUDGES, "embodied.agents.find.study")
 
     def tables(self) -> Mapping[str, StudyTable]:
-        return study_tables("find")
+        """Of houses as they are; of a data set of the kind 'doors', with closed doors."""
+        doors = self.training_data().data.kind == CONFIG.kind
+        return {CONFIG.kind if doors else name: table for name, table in study_tables("find").items()}
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
         return self.repeats if row.label in SEVERAL else self.repeats[:1]
@@ -284,13 +291,14 @@ class FindStudy(SightedStudy):
 
     def where(self, agent: Any, judge: Mapping[str, Any], split: str) -> SplitData:
         places = self.judged_in(judge).places(split)
-        return SplitData(split, places, tuple(tasks_in(places, self.house_tasks)), FIND.environments(EnvInputs(places)))
+        tasks = tasks_in(places, self.house_tasks, kind=self.training_data().data.kind)
+        return SplitData(split, places, tuple(tasks), FIND.environments(EnvInputs(places)))
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return {**super().judged(row, split), "house tasks": self.house_tasks}
 
     def training_data(self) -> TrainingData:
-        """Of any kind: its houses are all that counts."""
+        """Of any kind: its houses are all that counts, but that agents are judged behind closed doors on 'doors'."""
         return TrainingData(Dataset(self.data), load_encoder(self.encoder), self.pictures, cache=self.cache)
 
     def about(self) -> str:

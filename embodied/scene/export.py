@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,7 @@ import numpy as np
 import shapely
 
 from embodied.assets.cache import write_bytes, write_json
-from embodied.house.house import House, Placement
+from embodied.house.house import House
 from embodied.house.shapes import footprint
 from embodied.scene.doors import metadata
 from embodied.scene.lit_pages import LitPages
@@ -37,7 +36,6 @@ def export_mjcf(
     free: frozenset[str] = frozenset(),
     lit: LitPages | None = None,
     hinged: bool = False,
-    contents: Sequence[Placement] = (),
 ) -> Path:
     """Write `folder`/house.xml with its meshes and textures; opens in MuJoCo's own viewer and in dm_control as it is.
 
@@ -50,13 +48,12 @@ def export_mjcf(
       free: placements that physics may move, see embodied.scene.model.loose.
       lit: write the house with its baked light instead of its materials.
       hinged: doors, drawers and lids move, and house_metadata.json says what bodies and joints are.
-      contents: what lies in furniture that is hinged (embodied.generate.contents).
 
     Returns:
       The path of house.xml.
     """
     folder = Path(folder)
-    spec = build_spec(house, catalogue, free=free, lit=lit, hinged=hinged, contents=contents)
+    spec = build_spec(house, catalogue, free=free, lit=lit, hinged=hinged)
     _add_cameras(spec, house)
     for element in (*spec.geoms, *spec.bodies, *spec.joints, *spec.cameras):
         element.name = element.name.replace("/", ".")

@@ -30,7 +30,7 @@ POLICIES: Mapping[str, AgentMaker] = {
     name: functools.partial(lambda make, split: make(), make) for name, make in WITHOUT_LEARNING.items()
 }
 
-ACTS = {"moved": interface.Move, "opened": interface.Open, "closed": interface.Close}
+ACTS: Mapping[str, Any] = {"moved": interface.Move, "opened": interface.Open, "closed": interface.Close}
 """Actions of an agent that name a candidate, by the kind of their events."""
 
 
@@ -220,7 +220,7 @@ class Game:
         body = {} if action.thought is None else {"thought": parse(to_json(action.thought))}
         for kind, act in ACTS.items():
             if isinstance(action, act):
-                return kind, {"candidate": action.candidate, **body}
+                return kind, {"candidate": action.candidate, **body}  # type: ignore[union-attr]
         if isinstance(action, interface.Ask):
             return "asked", {"question": action.question or "Can you help me?", **body}
         return "stopped", body

@@ -75,16 +75,14 @@ def run_glb(args: GlbOptions) -> None:
 
 
 def run_mjcf(args: MjcfOptions) -> None:
-    from embodied.generate.contents import contents
     from embodied.locks import locked
     from embodied.scene.export import export_mjcf
     from embodied.scene.model import takeable
 
     house, catalogue, lit = lit_house(args)
     free = takeable(house, catalogue) if args.loose else frozenset()
-    inside = contents(house, catalogue, hidden=True) if args.hinged else ()
     with locked(args.out):
-        path = export_mjcf(house, catalogue, args.out, lit=lit, hinged=args.hinged, free=free, contents=inside)
+        path = export_mjcf(house, catalogue, args.out, lit=lit, hinged=args.hinged, free=free)
     show_written(args, "mjcf", house, lit, path)
 
 
