@@ -228,18 +228,10 @@ def parsed(args: EvaluateOptions) -> Evaluation:
         for split in splits:
             data.names(split)  # refuses unknown ones
     client = functools.cache(lambda: client_of(args))
-    return Evaluation(
-        args=args,
-        kind=kind,
-        data=data,
-        splits=splits,
-        agents=agents,
-        trained=trained,
-        reword=assistant_maker(args.assistant, client, args.prompts),
-        client=client,
-        limit=args.tasks or (FEW_TASKS if LLM in agents.values() or data is None else None),
-        rules=kind.checked_rules(args.rules),
-    )
+    reword = assistant_maker(args.assistant, client, args.prompts)
+    limit = args.tasks or (FEW_TASKS if LLM in agents.values() or data is None else None)
+    rules = kind.checked_rules(args.rules)
+    return Evaluation(args, kind, data, splits, agents, trained, reword, client, limit, rules)
 
 
 def agents_of(args: EvaluateOptions, kind: TaskKind) -> tuple[dict[str, str], tuple[Learner, Path] | None]:

@@ -233,23 +233,15 @@ class HelpEnv:
         ways = tuple(p.node for p in poses), candidates
         now = interface.Situation(*doing, *ways, self.time, self.requests, left, tuple(self._trail), closed=self.closed)
         self.situation = dataclasses.replace(now, extras=self._truth())
-        self.observation = interface.Observation(
-            sight=interface.Sight(self.seen_from(self.pose.node), self.pose.node),
-            turn=self.pose.turn,
-            tilt=self.pose.tilt,
-            candidates=candidates,
-            instruction=self.instruction,
-            target=None if self.target is None else interface.Sight(self.target.world, self.target.node, picture=True),
-            mode=self.mode,
-            can_ask=self._askable(self.situation),
-            requests_left=left,
-            time=self.time,
-            time_on_task=self.time_on_task,
-            moved=bool(self._steps) and self._steps[-1].pose.node != self.pose.node,
-            extras=self._extras(),
-            can_open=tuple(barred),
-            can_close=self._closable(),
+        aim = None if self.target is None else interface.Sight(self.target.world, self.target.node, picture=True)
+        sight, angles = (
+            interface.Sight(self.seen_from(self.pose.node), self.pose.node),
+            (self.pose.turn, self.pose.tilt),
         )
+        stated = self.instruction, aim, self.mode, self._askable(self.situation), left, self.time, self.time_on_task
+        moved = bool(self._steps) and self._steps[-1].pose.node != self.pose.node
+        seen = interface.Observation(sight, *angles, candidates, *stated, moved, self._extras())
+        self.observation = dataclasses.replace(seen, can_open=tuple(barred), can_close=self._closable())
         return self.observation
 
     def _barred(self, candidate: int) -> tuple[str, ...]:

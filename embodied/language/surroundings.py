@@ -120,18 +120,10 @@ def look(world: SeenPlace, node: int) -> Surroundings:
         between = [
             (float(np.hypot(*(at - here[:2] - step[:2] / 2))), name) for name, beyond, at in doors if beyond == other
         ]
-        ways.append(
-            Way(
-                node=int(n),
-                yaw=math.atan2(step[1], step[0]),
-                length=float(np.hypot(step[0], step[1])),
-                kind=house.room_by_id[other].kind,
-                leaves=other != room,
-                door=min(between)[1] if between else None,
-                closed=bool(graph.barred(node, n, graph.closed)),
-                climb=(UP if step[2] > 0 else DOWN) if abs(step[2]) > LEVEL else None,
-            )
-        )
+        where = int(n), math.atan2(step[1], step[0]), float(np.hypot(step[0], step[1]))
+        beyond_it = house.room_by_id[other].kind, other != room, min(between)[1] if between else None
+        climb = (UP if step[2] > 0 else DOWN) if abs(step[2]) > LEVEL else None
+        ways.append(Way(*where, *beyond_it, closed=bool(graph.barred(node, n, graph.closed)), climb=climb))
     seen_doors = tuple(Door(name, (float(at[0] - here[0]), float(at[1] - here[1]))) for name, _, at in doors)
     return Surroundings(house.room_by_id[room].kind, things, tuple(ways), seen_doors, is_on_stairs(world, node))
 

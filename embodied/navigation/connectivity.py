@@ -34,17 +34,9 @@ def to_matterport(graph: NavGraph, house: House, path: Path) -> None:
     seen = sight_lines(graph, house)
     items = []
     for k, (x, y, z) in enumerate(graph.positions.tolist()):
-        items.append(
-            {
-                "image_id": graph.ids[k],
-                "pose": [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0],
-                "included": True,
-                "visible": seen[k].tolist(),
-                "unobstructed": open_[k].tolist(),
-                "height": EYE,
-                "room": graph.room_of_node[k],
-            }
-        )
+        pose = [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0]
+        here = {"image_id": graph.ids[k], "pose": pose, "included": True, "visible": seen[k].tolist()}
+        items.append({**here, "unobstructed": open_[k].tolist(), "height": EYE, "room": graph.room_of_node[k]})
     write_bytes(Path(path), json.dumps(items).encode())
 
 

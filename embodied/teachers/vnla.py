@@ -226,20 +226,8 @@ class VnlaTeacher:
                 trail.append(step.pose.node)
             left = None if episode.budget is None else episode.budget - requests
             candidates, _ = self.moves.at(world, step.pose)
-            situation = interface.Situation(
-                world=world,
-                task=episode.task,
-                pose=step.pose,
-                mode=step.mode,
-                targets=step.targets,
-                subtask=subtask,
-                candidate_nodes=step.candidate_nodes,
-                candidates=candidates,
-                time=time,
-                requests=requests,
-                requests_left=left,
-                trail=tuple(trail),
-            )
+            stated = world, episode.task, step.pose, step.mode, step.targets, subtask, step.candidate_nodes, candidates
+            situation = interface.Situation(*stated, time, requests, left, tuple(trail))
             label = self.label(situation, step.action.thought)
             asked = isinstance(step.action, interface.Ask)
             labels.append(interface.Label(None if asked else label.move, label.ask if step.can_ask else None))
