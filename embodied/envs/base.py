@@ -231,17 +231,14 @@ class HelpEnv:
         left = None if self.budget is None else max(self.budget - self.requests, 0)
         doing = self.world, self.task, self.pose, self.mode, self.targets, self.subtask
         ways = tuple(p.node for p in poses), candidates
-        now = interface.Situation(*doing, *ways, self.time, self.requests, left, tuple(self._trail), closed=self.closed)
-        self.situation = dataclasses.replace(now, extras=self._truth())
+        spent = self.time, self.requests, left, tuple(self._trail)
+        self.situation = interface.Situation(*doing, *ways, *spent, "", self._truth(), self.closed)
         aim = None if self.target is None else interface.Sight(self.target.world, self.target.node, picture=True)
-        sight, angles = (
-            interface.Sight(self.seen_from(self.pose.node), self.pose.node),
-            (self.pose.turn, self.pose.tilt),
-        )
+        sight, turn = interface.Sight(self.seen_from(self.pose.node), self.pose.node), self.pose.turn
         stated = self.instruction, aim, self.mode, self._askable(self.situation), left, self.time, self.time_on_task
         moved = bool(self._steps) and self._steps[-1].pose.node != self.pose.node
-        seen = interface.Observation(sight, *angles, candidates, *stated, moved, self._extras())
-        self.observation = dataclasses.replace(seen, can_open=tuple(barred), can_close=self._closable())
+        doors = self._extras(), tuple(barred), self._closable()
+        self.observation = interface.Observation(sight, turn, self.pose.tilt, candidates, *stated, moved, *doors)
         return self.observation
 
     def _barred(self, candidate: int) -> tuple[str, ...]:
