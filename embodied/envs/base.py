@@ -231,8 +231,8 @@ class HelpEnv:
         left = None if self.budget is None else max(self.budget - self.requests, 0)
         doing = self.world, self.task, self.pose, self.mode, self.targets, self.subtask
         ways = tuple(p.node for p in poses), candidates
-        spent = self.time, self.requests, left, tuple(self._trail)
-        self.situation = interface.Situation(*doing, *ways, *spent, "", self._truth(), self.closed)
+        trail, known = tuple(self._trail), (self._truth(), self.closed)
+        self.situation = interface.Situation(*doing, *ways, self.time, self.requests, left, trail, "", *known)
         aim = None if self.target is None else interface.Sight(self.target.world, self.target.node, picture=True)
         sight, turn = interface.Sight(self.seen_from(self.pose.node), self.pose.node), self.pose.turn
         stated = self.instruction, aim, self.mode, self._askable(self.situation), left, self.time, self.time_on_task

@@ -133,10 +133,6 @@ def shortest(episode: interface.Episode, graph: NavGraph) -> float:
     return min(float(graph.distance[episode.task.start.node, g]) for g in episode.task.goal_nodes) + OPENING
 
 
-def parts_opened(episode: interface.Episode, graph: NavGraph) -> float:
-    return float(sum(len(s.moved) for s in episode.steps if isinstance(s.action, interface.Open)))
-
-
 STORED_KIND = task_kind.register_kind(
     task_kind.TaskKind(
         name="stored",
@@ -148,7 +144,11 @@ STORED_KIND = task_kind.register_kind(
         success=found,
         shortest=shortest,
         needs_stop=True,
-        metrics={"parts opened": task_kind.Metric(parts_opened)},
+        metrics={
+            "parts opened": task_kind.Metric(
+                lambda e, _: sum(len(s.moved) for s in e.steps if isinstance(s.action, interface.Open))
+            )
+        },
         columns=("success", "spl", "parts opened", "navigation error", "steps"),
         opens_doors=True,
         story=task_kind.StoryStyle(dialogue=False),
