@@ -202,7 +202,7 @@ def _add(writer: Writer, episode: Episode, data: Dataset, actions: int, succeede
     place = data.place_of(episode)
     rows = {
         "observation.state": np.stack([state(s.pose, place) for s in episode.steps]),
-        "action": np.stack([action(s, place)[:most] for s in episode.steps]),
+        "action": np.stack([action(s, place)[:actions] for s in episode.steps]),
         "candidates": np.stack([candidates(s, place) for s in episode.steps]),
         "candidate": np.array([getattr(s.action, "candidate", -1) for s in episode.steps]),
     }

@@ -144,11 +144,7 @@ STORED_KIND = task_kind.register_kind(
         success=found,
         shortest=shortest,
         needs_stop=True,
-        metrics={
-            "parts opened": task_kind.Metric(
-                lambda e, _: sum(len(s.moved) for s in e.steps if isinstance(s.action, interface.Open))
-            )
-        },
+        metrics={"parts opened": task_kind.Metric(lambda e, _: sum(type(s.action) is interface.Open for s in e.steps))},
         columns=("success", "spl", "parts opened", "navigation error", "steps"),
         opens_doors=True,
         story=task_kind.StoryStyle(dialogue=False),
