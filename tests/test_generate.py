@@ -17,6 +17,7 @@ from embodied.generate import STAGES, HouseConfig, generate_house, stages
 from embodied.generate.config import RETRIES
 from embodied.generate.kinds import BEDROOMS, ROOM_TABLE, Extra
 from embodied.generate.novelty import STYLE_FINISHES
+from embodied.generate.program import FURTHER
 from embodied.generate.stages import Draft
 from embodied.generate.walkways import remove_blocking_objects
 from embodied.house.house import DOORS, House, HouseError, Placement, Room, check
@@ -293,10 +294,11 @@ def test_a_new_kind_of_room_is_an_entry_in_each_of_two_tables(tmp_path, monkeypa
     monkeypatch.setattr("embodied.house.house.ROOM_KINDS", (*ROOM_KINDS, "music_room"))
     often = Extra(house=0.0, size=14.0, likely=1e6)
     monkeypatch.setitem(ROOM_TABLE, "music_room", replace(ROOM_TABLE["library"], extra=often))
+    monkeypatch.setitem(FURTHER, "music_room", often)
     (tmp_path / "groups.toml").write_text(
         '[rooms.music_room]\nrules = [{ group = "piece", role = "upright piano" }, { group = "greenery" }]'
     )
-    house = generate_house(4, HouseConfig(rooms=6, bedrooms=2), load_catalogue(own=tmp_path))
+    house = generate_house(4, HouseConfig(rooms=6, bedrooms=2, storeys=1), load_catalogue(own=tmp_path))
     rooms = {r.id for r in house.rooms if r.kind == "music_room"}
     assert rooms and {p.room for p in house.placements if p.object_class == "upright piano"} >= rooms
 

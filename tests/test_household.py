@@ -34,7 +34,7 @@ def catalogue():
 
 @functools.cache
 def lived_in(seed: int, disorder: float | None = None) -> House:
-    return generate_house(seed, HouseConfig(area=(75.0, 130.0), disorder=disorder), catalogue())
+    return generate_house(seed, HouseConfig(area=(75.0, 130.0), storeys=1, disorder=disorder), catalogue())
 
 
 def of_class(house: House, *names: str) -> int:

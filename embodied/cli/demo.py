@@ -203,7 +203,7 @@ def somebody_walks(world: World) -> tuple[Day, str, float, float] | None:
 
 
 def film_a_walk(path: Path, world: World) -> Path | None:
-    """Film `somebody_walks`; None where nobody does."""
+    """Film `somebody_walks`; None where nobody does, or in a house that is not lit."""
     import numpy as np
     import shapely
 
@@ -213,7 +213,7 @@ def film_a_walk(path: Path, world: World) -> Path | None:
     from embodied.viz.video import FPS, write_video
     from embodied.world import SLACK
 
-    if (walker := somebody_walks(world)) is None:
+    if world.pictures.quality is None or (walker := somebody_walks(world)) is None:
         return None
     day, name, begin, end = walker
     eyes, sight = world.graph.positions, sight_floor(world.house, 0)

@@ -94,7 +94,7 @@ class Day:
     """The lives of a household from midnight to midnight.
 
     Examples:
-      >>> day = day_of(house, catalogue, seed=7)
+      >>> day = embodied.day_of(house, catalogue, seed=7)
       >>> {piece.spot.activity for piece in day.now("3:00").values()}
       {'sleeping'}
     """
@@ -152,7 +152,11 @@ def seconds_of(time: str | float) -> float:
 
 
 def day_of(house: House, catalogue: Catalogue, *, seed: int) -> Day:
-    """The day of who lives in a house; the same seed gives the same day."""
+    """The day of who lives in a house; the same seed gives the same day.
+
+    Examples:
+      >>> evening = embodied.day_of(house, catalogue, seed=7).at("18:30")
+    """
     home, rng = household_of(house), stream(seed, "day", house.name)
     ages = {f"adult_{k + 1}": 40 for k in range(home.adults)}
     ages |= {f"child_{k + 1}": age for k, age in enumerate(home.children)}
