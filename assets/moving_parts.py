@@ -31,7 +31,7 @@ OPENING_CLASSES = frozenset(OPENING_ROWS)
 """Classes in whose models moving parts are looked for. A row may have a "kind": "flap" (doors hang at their lower edge
 where the handle is in the middle), "round", "lid" or "curtain"; "only_doors" where what looks like a drawer is fixed;
 a "basin" that reaches so many metres below the upper edge of a front; the "skin" of its inside; and the classes of what
-it "holds", in "drawers" where these hold something else (embodied.generate.contents)."""
+it "holds", in "drawers" where these hold something else (embodied.house.contents)."""
 FULL_TURN = {"door": math.pi / 2, "flap": 1.45, "lid": 1.5}
 """Radians at openness 1; a drawer comes out by PULL of its depth."""
 PULL = 0.75

@@ -17,7 +17,7 @@ from embodied.assets.cache import default_cache, digest
 from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.assets.decoding import load_record, save_record
-from embodied.generate.contents import stocked
+from embodied.house.contents import stocked
 from embodied.house.house import HINGED, House
 from embodied.house.moment import Moment, RigidPose, apart
 from embodied.house.validation import load_lit_house

@@ -17,9 +17,9 @@ from embodied.generate.furnish.context import Context, Stock
 from embodied.generate.furnish.smalls import CarrierSurface, SurfaceOccupancy
 from embodied.generate.furnish.space import Thing, overlap, room_space
 from embodied.generate.furnish.tables import AT, LIKES, tables
-from embodied.generate.household import HABITS, Household, draw_household, household_of
 from embodied.geometry import rectangle
 from embodied.house.house import House
+from embodied.house.household import HABITS, Household, draw_household, household_of
 
 UNITS = ("base cabinet", "drawer cabinet", "kitchen sink", "cooker", "corner base cabinet", "tall cabinet")
 FEW = 2

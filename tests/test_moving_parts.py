@@ -19,8 +19,8 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.assets.moving_parts import OPENING_CLASSES, taken_apart
 from embodied.assets.records import bounds
 from embodied.generate import generate_house
-from embodied.generate.contents import contents, part_of
 from embodied.generate.left_open import free_openness, left_open
+from embodied.house.contents import contents, part_of
 from embodied.house.house import House, HouseError, Placement
 from embodied.house.moment import Moment, apart
 from embodied.house.shapes import inward

@@ -15,7 +15,6 @@ from hand_worlds import grid_world, thing
 
 from embodied.assets.records import Asset, SupportSurface
 from embodied.assistants.route_system import route_paths
-from embodied.generate.household import household_of
 from embodied.generate.people import (
     BACK,
     CLASS,
@@ -33,6 +32,7 @@ from embodied.generate.people import (
 from embodied.generate.rearrange import rearranged
 from embodied.geometry import facing_of, wrap
 from embodied.house.house import House, Opening, Placement, check
+from embodied.house.household import household_of
 from embodied.house.shapes import footprint
 from embodied.navigation.free_space import leaves
 from embodied.navigation.graph import AGENT_RADIUS, NavGraph, graph_of, unreachable_rooms

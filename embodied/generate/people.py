@@ -15,9 +15,9 @@ import shapely
 from embodied.assets.people import Person as PersonModel
 from embodied.assets.people import people as everybody
 from embodied.assets.people.figures import person_of
-from embodied.generate.household import household_of
 from embodied.geometry import rectangle, rotation, yaw_facing
 from embodied.house.house import House, Placement, Room, rounded
+from embodied.house.household import household_of
 from embodied.house.shapes import footprint
 from embodied.navigation.free_space import leaves
 from embodied.navigation.graph import AGENT_RADIUS, unreachable_rooms

@@ -18,7 +18,7 @@ import numpy as np
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.moving_parts import TakenApart, closed, openness_of
 from embodied.assets.people import people
-from embodied.generate.contents import STORED, contents
+from embodied.house.contents import STORED, contents
 from embodied.house.house import House, Opening
 from embodied.house.moment import WIDEST, Moment, RigidPose, apart
 from embodied.house.shapes import room_at

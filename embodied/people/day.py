@@ -20,9 +20,9 @@ import shapely
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import read_toml
 from embodied.assets.people import POSES, Person, Pose, people
-from embodied.generate.household import household_of
 from embodied.geometry import facing_of, rotation, yaw_facing
 from embodied.house.house import House, Placement
+from embodied.house.household import household_of
 from embodied.house.moment import WIDEST, Moment, MovingPerson, RigidPose, Triple
 from embodied.house.shapes import footprint, inward
 from embodied.navigation.floor_ways import FloorWays

@@ -220,7 +220,7 @@ class Game:
         body = {} if action.thought is None else {"thought": parse(to_json(action.thought))}
         for kind, act in ACTS.items():
             if isinstance(action, act):
-                return kind, {"candidate": action.candidate, **body}  # type: ignore[union-attr]
+                return kind, {"candidate": action.candidate, **body}
         if isinstance(action, interface.Ask):
             return "asked", {"question": action.question or "Can you help me?", **body}
         return "stopped", body

@@ -21,9 +21,9 @@ from embodied.generate.furnish.room import furnish_room, place_own, shortage
 from embodied.generate.furnish.smalls import clutter
 from embodied.generate.furnish.space import RoomSpace, Thing, room_space
 from embodied.generate.furnish.tables import tables_of
-from embodied.generate.household import household_of
 from embodied.geometry import wrap
 from embodied.house.house import House, Light, Placement, Room, rounded
+from embodied.house.household import household_of
 from embodied.seeds import stream
 
 

@@ -15,7 +15,7 @@ from embodied.assets.records import Asset, Size
 from embodied.generate.furnish.arrange import Item, ScoredPose, pack
 from embodied.generate.furnish.space import Box, Params, RoomSpace, Thing
 from embodied.generate.furnish.tables import Style, Tables
-from embodied.generate.household import Household
+from embodied.house.household import Household
 
 SEEDS = 3
 """Few, because equal arguments share one mesh."""

@@ -315,7 +315,7 @@ class SmallObject:
     mess: bool = False
     """Left where it was used: more of it in untidy houses, none in the tidiest."""
     habit: str = ""
-    """Only who has this habit has it (embodied.generate.household)."""
+    """Only who has this habit has it (embodied.house.household)."""
     spot: str = "any"
     """Place on its carrier: "any", "back", "front", "side" or "centre"."""
     turn: float = 0.4

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from embodied.assets.moving_parts import OPENING_ROWS, MovingPart, openness_of
-from embodied.generate.household import household_of
 from embodied.house.house import House, Placement
+from embodied.house.household import household_of
 from embodied.house.moment import RigidPose, apart
 from embodied.seeds import stream
 
