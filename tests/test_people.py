@@ -25,14 +25,13 @@ from embodied.generate.people import (
     POLITE,
     add_people,
     place_people,
-    residents,
     sits,
     stands,
 )
 from embodied.generate.rearrange import rearranged
 from embodied.geometry import facing_of, wrap
 from embodied.house.house import House, Opening, Placement, check
-from embodied.house.household import household_of
+from embodied.house.household import household_of, residents
 from embodied.house.shapes import footprint
 from embodied.navigation.free_space import leaves
 from embodied.navigation.graph import AGENT_RADIUS, NavGraph, graph_of, unreachable_rooms

@@ -12,12 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from embodied.assets.people import Person as PersonModel
-from embodied.assets.people import people as everybody
 from embodied.assets.people.figures import person_of
 from embodied.geometry import rectangle, rotation, yaw_facing
 from embodied.house.house import House, Placement, Room, rounded
-from embodied.house.household import household_of
+from embodied.house.household import residents
 from embodied.house.shapes import footprint
 from embodied.navigation.free_space import leaves
 from embodied.navigation.graph import AGENT_RADIUS, unreachable_rooms
@@ -39,8 +37,6 @@ STANDING = 0.9
 """Least height of a standing figure, metres."""
 RESIDENT = 4.0
 """How many times as often one meets somebody who lives in the house as somebody who visits it."""
-GROWN_UP = 18
-"""Age from which somebody of the pack is one of a household's adults, years."""
 ROOM = 0.01
 """Least area of the free spots that a figure may choose from, square metres."""
 SIT = 0.5
@@ -90,20 +86,6 @@ def place_people(house: House, graph: NavGraph, catalogue: Catalogue, *, seed: i
         for n in range(len(graph.positions))
     }
     return {n: p for n, p in met.items() if p is not None}
-
-
-def residents(house: House) -> tuple[PersonModel, ...]:
-    """Those of the pack who live in a house: of one family, grown-ups and children as its household has them."""
-    rng, household = stream(house.seed, "house", "family"), household_of(house)
-    families = sorted({p.family for p in everybody().values()})
-    family = families[int(rng.integers(len(families)))]
-    own = sorted((p for p in everybody().values() if p.family == family), key=lambda p: p.age)
-    adults = [p for p in own if p.age >= GROWN_UP]
-    if not household.children:
-        adults = [adults[i] for i in rng.permutation(len(adults))]
-    apart = lambda p: min((abs(p.age - age) for age in household.children), default=0)
-    children = sorted((p for p in own if p.age < GROWN_UP), key=apart)
-    return (*adults[: household.adults], *children[: len(household.children)])
 
 
 def _who(asset: Asset) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from embodied.assets.people import Person, people
 from embodied.house.house import House
 from embodied.seeds import stream
 
@@ -16,6 +17,8 @@ ROOM_FOR = {"study": "works at home", "library": "reads", "gym": "does sports", 
 """Room kind to the habit that whoever has such a room certainly has."""
 PRIVATE = ("main_bedroom", "bedroom", "kids_room")
 """Room kinds that belong to some of the household."""
+GROWN_UP = 18
+"""Age from which somebody of the pack is one of a household's adults, years."""
 
 
 @dataclass(frozen=True)
@@ -73,3 +76,17 @@ def draw_household(kinds: Sequence[str], *, rng: np.random.Generator) -> Househo
     drawn = {name for name, share in HABITS.items() if rng.random() < share}
     certain = {habit for kind, habit in ROOM_FOR.items() if kind in kinds}
     return Household(adults, tuple(sorted(children, reverse=True)), frozenset(drawn | certain))
+
+
+def residents(house: House) -> tuple[Person, ...]:
+    """Those of the pack who live in a house: of one family, grown-ups and children as its household has them."""
+    rng, household = stream(house.seed, "house", "family"), household_of(house)
+    families = sorted({p.family for p in people().values()})
+    family = families[int(rng.integers(len(families)))]
+    own = sorted((p for p in people().values() if p.family == family), key=lambda p: p.age)
+    adults = [p for p in own if p.age >= GROWN_UP]
+    if not household.children:
+        adults = [adults[i] for i in rng.permutation(len(adults))]
+    apart = lambda p: min((abs(p.age - age) for age in household.children), default=0)
+    children = sorted((p for p in own if p.age < GROWN_UP), key=apart)
+    return (*adults[: household.adults], *children[: len(household.children)])

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.assets.people import people
-from embodied.generate.people import residents
 from embodied.house.house import House
+from embodied.house.household import residents
 from embodied.house.moment import MovingPerson
 from embodied.navigation.floor_ways import FloorWays
 from embodied.people.errands import WAY_STEP, ErrandLeg, legs_along, smooth_line
