@@ -28,9 +28,9 @@ HEAD = 'title = "Finding things"\ndata = "data"\nconsent = "I agree."\npractice 
 TOGETHER = '[[parts]]\nname = "together"\ntasks = 3\nper_person = 3\n'
 
 
-def make_data(folder: Path, kind: str = "hanna"):
+def make_data(folder: Path, kind: str = "hanna", make_house=small_house):
     """A data set with small painted panoramas in folder/data."""
-    data = built(folder / "data", kind, make_house=small_house)
+    data = built(folder / "data", kind, make_house=make_house)
     pictures = Unlit(size=64)
     for name in sorted({n for s in data.splits for n in data.names(s)}):
         place = data.place(name)

@@ -18,6 +18,7 @@ from test_scene import Unpainted
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.moving_parts import OPENING_CLASSES, taken_apart
 from embodied.assets.records import bounds
+from embodied.evaluation.evaluate import play
 from embodied.generate import generate_house
 from embodied.generate.left_open import free_openness, left_open
 from embodied.house.contents import contents, part_of
@@ -25,9 +26,14 @@ from embodied.house.house import House, HouseError, Placement
 from embodied.house.moment import Moment, apart
 from embodied.house.shapes import inward
 from embodied.house.validation import check_known
+from embodied.interface import Episode, Stop
+from embodied.kinds.metrics import spl, success
+from embodied.kinds.task_kind import EnvInputs, TaskInputs, kind_named
+from embodied.language.plain_language import PlainLanguage
 from embodied.light import bake
 from embodied.light.moving import MovingHouse
 from embodied.navigation.graph import build_graph
+from embodied.records import from_json, to_json
 from embodied.scene.doors import openness
 from embodied.scene.export import export_mjcf
 from embodied.scene.joinery import opening_parts
@@ -164,6 +170,22 @@ def test_casements_open_into_the_room_and_a_closed_window_is_one_piece():
             deep = (xy - o.a) @ inward(HOUSE, o)
             assert deep.max() - deep.min() > 0.8 * math.sin(1.2) * np.ptp(p.mesh.vertices[:, 0])
             assert deep.max() > (np.asarray(p.position[:2]) - o.a) @ inward(HOUSE, o) + 0.2
+
+
+def test_a_thing_in_a_drawer_counts_only_when_it_was_opened_and_the_expert_does(tmp_path):
+    kind, graph = kind_named("stored"), build_graph(HOUSE)
+    with World(HOUSE, CATALOGUE, graph, tmp_path) as world:
+        tasks = kind.tasks(TaskInputs(world, (), 0, PlainLanguage()), [("main", 12)])["main"]
+        make = kind.environments(EnvInputs({HOUSE.name: world}))
+        episodes = play(make, kind.agent("shortest"), tasks, seed=0)
+        assert tasks and all(success(e, graph) and spl(e, graph) == pytest.approx(1) for e in episodes)
+        assert all(from_json(Episode, to_json(e)) == e for e in episodes)
+        env = make()
+        for task in tasks[:3]:
+            o = env.reset(dataclasses.replace(task, start=dataclasses.replace(task.start, node=task.goal_nodes[0])))
+            assert o.can_open and not o.candidates.allowed[list(o.can_open)].any()
+            env.step(Stop())
+            assert not success(env.episode(), graph), "nothing was opened"
 
 
 @pytest.fixture(scope="module")

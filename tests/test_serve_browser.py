@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 import shutil
@@ -10,10 +11,12 @@ import cv2
 import numpy as np
 import pytest
 from hand_serve import Served, gradient, make_data, write_study
+from test_moving_parts import HOUSE
 
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.evaluate import play
 from embodied.interface import Episode
+from embodied.navigation.graph import build_graph
 from embodied.policies.baselines import Forward10
 from embodied.records import load_lines, save_lines
 from embodied.serve.results import Judgement
@@ -241,3 +244,36 @@ def test_the_page_shows_what_the_panorama_shows(two, server, without_webgl):
     true = gradient(start.node).view_rgb(yaw, pitch, vfov, (height, width))
     error = np.abs(shown.astype(int) - true)[20:-20, 20:-20]
     assert np.median(error) < 6 and np.mean(error > 40) < 0.03
+
+
+def house_that_opens(seed, name, config, catalogue):
+    """Two rooms with a fridge, drawers and a wardrobe."""
+    house = dataclasses.replace(HOUSE, name=name)
+    return house, build_graph(house)
+
+
+def test_furniture_is_opened_by_a_key_closed_by_a_button_and_seen_open(browser, tmp_path):
+    make_data(tmp_path, "stored", house_that_opens)
+    part = '[[parts]]\nname = "alone"\ntasks = 1\nper_person = 1\nassistant = "none"\nsplit = "test_unseen"\n'
+    served = Served(write_study(tmp_path, part))
+    try:
+        one = Someone(browser, served)
+        fetched, doors = set(), one.page.get_by_role("group", name="Doors").get_by_role("button")
+        one.page.on("response", lambda r: fetched.add((r.status, r.url.split("/")[-2])) if "/pano/" in r.url else None)
+        one.sees("steps left")
+        for _ in range(4):  # until something is within reach
+            if doors.count():
+                break
+            one.page.keyboard.press("Enter")
+            one.page.wait_for_timeout(3000)
+        known = {name for _, name in fetched}
+        what = re.match("Open the (.*?),", doors.first.inner_text())[1]
+        with one.page.expect_response(lambda r: "/pano/" in r.url and r.url.split("/")[-2] not in known) as seen:
+            one.page.keyboard.press("o")
+        assert seen.value.status == 200
+        one.sees(f"Close the {what}")
+        one.page.get_by_role("button", name=f"Close the {what}").first.click()
+        playwright.expect(one.page.get_by_role("button", name=f"Close the {what}")).to_have_count(0, timeout=600_000)
+        one.close()
+    finally:
+        served.stop()

@@ -6,8 +6,6 @@ that way. All learners begin alike: the world gives tasks with requests, an agen
 they hear: a description, a demonstration, or a number.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """ILIAD, REGEX and NAV, as a learner of agents.studies.engine."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -2,8 +2,6 @@
 imitation; and of a student, whatever the problem and the learner. Resumable, validated, exact after a kill, since
 batches are drawn by (seed, update)."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

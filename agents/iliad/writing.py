@@ -4,8 +4,6 @@ B data points, S places of what was read, T numbers that are written, h hidden s
 choose from; 0 is padding everywhere.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import torch

@@ -5,8 +5,6 @@ BUILT_ASSETS holds them by key, 'built/<name>', and what stands for a pack's poo
 `BUILT_ASSETS[key].make(size, params, finish)` gives the meshes.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Beds, sofas, tables, chairs, a toilet and a television of simple shape, where no furniture models are installed."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from embodied.assets.built.parametric import BuildRequest, handle, parts_of, plain

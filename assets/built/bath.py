@@ -1,7 +1,5 @@
 """Bathroom: vanity, shower, towels, mats and what stands around the basin."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 

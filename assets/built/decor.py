@@ -1,7 +1,5 @@
 """Pictures, posters, mirrors, clocks, vases and house plants."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Things by the door: coats, shoes, umbrellas, mats, bags."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 

@@ -1,7 +1,5 @@
 """Things left about: post, notes, cables, clothes thrown down, unmade bedding, tins, jars, toys, folders."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from embodied.assets.built.parametric import TINTS, BuildRequest, FinishedShapes, parts_of, plain

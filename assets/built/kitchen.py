@@ -1,7 +1,5 @@
 """Kitchen units that belong together: base, drawers, sink, cooker, wall and tall cabinets, island, hood."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 

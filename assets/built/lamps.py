@@ -1,8 +1,6 @@
 """Lamps, whose shades and bulbs glow: pendants, ceiling lamps, downlights, sconces, floor and bedside lamps; and what
 else hangs on wires and pipes: switches, sockets, radiators and washing machines."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

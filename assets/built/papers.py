@@ -1,7 +1,5 @@
 """Books, papers, frames and gadgets."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from embodied.assets.built import primitives

@@ -1,7 +1,5 @@
 """Assets that code builds to measure; finishes, cabinet work and other things that builders share."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Rugs, curtains, blinds, cushions and blankets."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from embodied.assets.built import primitives

@@ -1,7 +1,5 @@
 """Shelves, bookcases, wardrobes, boxes and floor cushions."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

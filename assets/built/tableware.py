@@ -1,7 +1,5 @@
 """Crockery, bottles, candles and kitchen things."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 

@@ -5,8 +5,6 @@ texture transforms, skins), the other reads files beside the model, in C++, unch
 read here all the same, to refuse it by name.
 """
 
-from __future__ import annotations
-
 import base64
 import io
 import json

@@ -5,8 +5,6 @@ turns them, then the bounding box is stretched to the catalogue's width, height 
 Sweet Home 3D does itself. The asset frame (embodied.assets.records.MeshPart) is (x, -z, y) of that.
 """
 
-from __future__ import annotations
-
 import functools
 import io
 import logging

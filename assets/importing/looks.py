@@ -5,8 +5,6 @@ A cover is a tile of factors with mean 1 that a part's colour is multiplied by, 
 of the model: along the longest side of each board for wood, upright for cloth.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import re

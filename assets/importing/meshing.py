@@ -1,7 +1,5 @@
 """Triangles made ready for rendering: welding, crease normals, decimation that keeps texture coordinates."""
 
-from __future__ import annotations
-
 import fast_simplification
 import numpy as np
 from scipy.spatial import cKDTree

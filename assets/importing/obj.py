@@ -5,8 +5,6 @@ that the packs are full of, and it keeps neither smoothing nor transparency apar
 release candidates only.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Iterator

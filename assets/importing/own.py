@@ -1,7 +1,5 @@
 """A user's own models: a folder of .glb, .obj or .sh3f files with a small catalogue.json."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath

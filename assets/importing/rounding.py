@@ -5,8 +5,6 @@ farthest from them (curved PN triangles: Vlachos et al., I3D 2001, section 3.2, 
 of sofas, cushions and tubes have round outlines and not only round shading.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from embodied.assets.importing.meshing import corner_angles, crease_normals, face_normals

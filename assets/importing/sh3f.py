@@ -5,8 +5,6 @@ climb out of their folder, or whose entries swell like a zip bomb, is refused as
 the catalogue that makes no sense loses its own model only. `pack_of` finds the library that holds a model.
 """
 
-from __future__ import annotations
-
 import collections
 import functools
 import importlib.util

@@ -1,7 +1,5 @@
 """Textures of models: colours multiplied into them, colours of vertices laid out as one, the shape of their holes."""
 
-from __future__ import annotations
-
 import functools
 
 import cv2

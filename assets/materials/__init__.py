@@ -1,7 +1,5 @@
 """Procedural, physically scaled, seamlessly tileable materials and their colours on disk."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import inspect

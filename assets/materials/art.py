@@ -1,7 +1,5 @@
 """Pictures and patterns that are used once, not tiled: wall art, rugs, dials, covers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import cv2

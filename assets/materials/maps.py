@@ -4,8 +4,6 @@ All arrays are (n, n) float32 over one square tile that repeats without a seam; 
 the image, which is v = 1. Lengths are metres unless a name says pixels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Tiles with grout, stone, brick, concrete, terrazzo and worktops."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass

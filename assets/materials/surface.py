@@ -1,7 +1,5 @@
 """Coats on walls and things: paint, plaster, wallpaper, metal, plastic, paper, wicker."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import cv2

@@ -1,7 +1,5 @@
 """Carpets, woven and felted cloth, velvet, leather, wicker."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

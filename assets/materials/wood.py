@@ -1,7 +1,5 @@
 """Wood: floors by pattern and species, and wood for furniture and doors."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 The picture goes all round (columns) and from zenith to nadir (rows); see far_canvas.
 """
 
-from __future__ import annotations
-
 import functools
 from pathlib import Path
 

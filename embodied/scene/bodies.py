@@ -1,7 +1,5 @@
 """Bodies of any MuJoCo model as parts: robots and things that users add, to be drawn in the light of a house."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from pathlib import Path
 

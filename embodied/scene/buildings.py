@@ -1,7 +1,5 @@
 """Neighbours' houses as flat faces: near ones become parts of the scene, far ones are painted into the distance."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Simple collision shapes: a handful of boxes for every object, and boxes around the openings of walls."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import json

@@ -6,8 +6,6 @@ A thing is the body '<id>' with a body '<id>_<part>' for each door, drawer and l
 '_rightdoorhinge', '_slidejoint' and '_microjoint', and for the regions '<id>_reg_main' and '_reg_int'.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterator, Mapping, Sequence

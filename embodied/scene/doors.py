@@ -8,8 +8,6 @@ the names of joints; MolmoSpaces for '_door_' in those of bodies, takes the firs
 and reads house_metadata.json.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ Rows lie closest around the horizon, where things are (`elevations`). Colours ar
 gives the light.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Far ground, hills with what covers them, and lakes."""
 
-from __future__ import annotations
-
 import functools
 
 import cv2

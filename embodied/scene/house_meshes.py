@@ -1,7 +1,5 @@
 """The one translation from a House to triangles: everything visible as a tuple of Parts."""
 
-from __future__ import annotations
-
 import typing
 
 from embodied.assets.records import Finish, MeshPart

@@ -4,8 +4,6 @@ An opening is built in its own frame: x from jamb p to jamb q along the wall's c
 the first room, z up from the storey's floor; `_Hole.world` carries it into the house.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence

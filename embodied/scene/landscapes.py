@@ -1,8 +1,6 @@
 """The landscapes that a house may stand in, the seasons, and the neighbours near by: tables, and what is drawn from a
 house's seed."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping

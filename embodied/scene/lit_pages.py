@@ -1,7 +1,5 @@
 """LitPages: what baked light hands to the renderers. A house's surfaces with their light painted on."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

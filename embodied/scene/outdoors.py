@@ -1,7 +1,5 @@
 """The outdoors seen through the windows: the house's own facade and roof, the ground, balconies, far things."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Part: one visible mesh of the house, who owns it and where it stands."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from embodied.assets.records import MeshPart

@@ -1,7 +1,5 @@
 """Bodies of people in MuJoCo models: capsules around their bones, which go where a moment has them (mocap bodies)."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Mapping
 

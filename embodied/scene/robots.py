@@ -1,7 +1,5 @@
 """Robots of any MJCF in a house: put on free floor, with names, options, masses and keyframes taken care of."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Iterator, Sequence

@@ -6,8 +6,6 @@ house from outside. Every wall is one planar mesh around its holes, so that it m
 chart. Texture coordinates are metres divided by the finish's tile.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Stairs: flights and landings, closed below where nothing lies beneath, railings, and the edges of the well."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Plane geometry of walls and floors that shell, joinery and outdoors share."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

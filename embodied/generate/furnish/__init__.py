@@ -5,8 +5,6 @@ user's own classes add (room.py), then what hangs on ceilings and walls (hanging
 small things on all of it (smalls.toml), then lights. docs/houses.md tells more.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections import Counter
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ somebody facing the group, the front toward -y. A group that stands at a wall ha
 y = 0. A pose puts that frame into the room.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,8 +1,6 @@
 """The one who furnishes a room: its space so far, assets by the role they play in a group, weighted by style, who lives
 there, and a generator."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Groups of the table find their place: which models, where each stands in the group, which poses are tried."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

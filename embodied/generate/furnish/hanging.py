@@ -3,8 +3,6 @@
 Pictures come over furniture first, then on what is left of free wall; what else hangs is in smalls.toml.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 
 from embodied.assets.records import Asset, Size

@@ -1,7 +1,5 @@
 """Kitchens: lines of units with sink, cooker and fridge, cabinets above them, islands."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

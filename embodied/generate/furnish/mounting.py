@@ -1,7 +1,5 @@
 """Hanging things on walls and from ceilings: where one fits, and which spots are tried in which order."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass

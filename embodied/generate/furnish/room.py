@@ -3,8 +3,6 @@
 Things of a user's own classes, which no group asks for, are each placed by their weight for the room.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

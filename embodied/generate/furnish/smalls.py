@@ -3,8 +3,6 @@
 smalls.toml says what there is: kettles on worktops, shoes at the door, dishes by the sink, clothes on a chair.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math
