@@ -176,7 +176,8 @@ def unguessed(config: VqaConfig, left: dict[str, list[VqaQuestion]], network: Ju
             of_id = dict(zip((q.id for qs in kept for q in qs), judge([q for qs in kept for q in qs], config.seed).T))
             kept = [less_guessed(qs, *np.array([of_id[q.id] for q in qs]).T) for qs in kept if qs]
         for split in left:
-            own, most = [[q for q in qs if q.walk.startswith(f"{split}_")] for qs in kept], config.questions[split]
+            own = [[q for q in qs if q.walk.startswith(f"{split}_")] for qs in kept]
+            most = math.inf if judge else config.questions[split]  # fewer at last: thinning needs many
             level = max(n for n in range(max(map(len, own)) + 1) if sum(min(len(qs), n) for qs in own) <= most)
             rng = stream(config.seed, "kept", split)
             left[split] = [qs[i] for qs in own for i in sorted(rng.permutation(len(qs))[:level].tolist())]
