@@ -196,6 +196,15 @@ def exported(tmp_path_factory):
     return mujoco.MjModel.from_xml_path(str(path)), json.loads((path.parent / "house_metadata.json").read_text())
 
 
+def test_what_lies_in_closed_furniture_is_exported_with_the_part_that_carries_it(exported):
+    model, _ = exported
+    inside = contents(HOUSE, CATALOGUE, hidden=True)
+    held = [c for c in inside if "drawer_cabinet" in c.id and not c.id.startswith("drawer_cabinet_1/drawer_2")]
+    assert {c.id.split(".")[0] for c in inside} == set(THINGS) - {"cooker_1"} and held
+    for c in held:
+        assert "drawer" in model.body(model.geom(f"{c.id}#0").bodyid[0]).name, c.id
+
+
 def test_robocasa_finds_joints_and_regions(exported):
     model, _ = exported
     joints, geoms = [model.joint(j).name for j in range(model.njnt)], [model.geom(g).name for g in range(model.ngeom)]

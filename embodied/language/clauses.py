@@ -1,7 +1,5 @@
 """Meaning of a route instruction, clause by clause, before anybody puts it into words."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 LEFT, RIGHT = "left", "right"

@@ -1,7 +1,5 @@
 """The voices of the house: a `Language` that speaks as people do, and a describer of what an agent did."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The plainest voice: requests, turns and room names, without landmarks or style; articles, plurals and blanks."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

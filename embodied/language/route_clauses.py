@@ -1,7 +1,5 @@
 """From a path to clauses: what a person who knows the way would mention."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

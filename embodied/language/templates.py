@@ -6,8 +6,6 @@ room noun, {thing} 'the red sofa', {metres} 'three meters', {steps} 'three big s
 {soon} an adverb. A slot is filled by the first clause of the template that has such a field.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """connectivity.json: navigation graphs as Matterport3DSimulator's programs read them, written and read."""
 
-from __future__ import annotations
-
 import json
 import logging
 from collections import Counter

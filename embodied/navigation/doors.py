@@ -1,7 +1,5 @@
 """Doors in play: which can be closed, and what is seen while some are."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Collection, Mapping
 from typing import TypeVar

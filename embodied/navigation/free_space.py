@@ -1,7 +1,5 @@
 """Places where a person can stand and what they can see: flat free-space polygons of one storey, metres, world."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 

@@ -1,7 +1,5 @@
 """Poses anywhere on the free floor, for who wants to stand between the viewpoints."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

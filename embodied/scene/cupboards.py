@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from embodied.assets.moving_parts import FIXED, TakenApart, boards_of, cut_open, openness_of
 from embodied.assets.records import MeshPart
 from embodied.house.house import House, Placement
-from embodied.house.moment import apart
+from embodied.house.moment import RigidPose, apart
 from embodied.scene import collision
 from embodied.scene.collision import CollisionBox
 from embodied.scene.doors import LEAF_DENSITY, Hung
@@ -113,6 +113,17 @@ def parts_of(case: Case, *, hidden: bool = False) -> Iterator[tuple[Part, Hung]]
     for name, meshes in shown.items():
         for k, mesh in enumerate(meshes):
             yield Part(p.id, "object", p.room, mesh, f"{p.asset}/{p.size}/{p.params}/{name}/{k}"), case.bodies[name]
+
+
+def lying(cases: Mapping[str, Case], things: Sequence[Placement], catalogue: Meshes) -> Iterator[tuple[Part, Hung]]:
+    """The meshes of what lies in closed furniture (embodied.house.contents), with the bodies that carry them."""
+    for c in (c for c in things if c.parent in cases):
+        case, name = cases[c.parent or ""], (c.group or "").partition("/")[2]
+        p, m = case.placement, next(m for m in case.whole.moving if m.name == name)
+        x, y, z = RigidPose.upright(p.position, p.yaw).local(np.array([c.position]))[0] - m.slides * m.origin
+        hung = Hung(case.bodies[name if m.slides else ""].body, (x, y, z))
+        for k, mesh in enumerate(catalogue.mesh(c.asset, c.size)):
+            yield Part(c.id, "object", c.room, mesh, f"{c.asset}/{c.size}#{k}"), hung
 
 
 def lit_apart(m: LitMesh, p: Placement, whole: TakenApart) -> tuple[LitMesh, np.ndarray, np.ndarray]:

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from embodied.assets.cache import write_bytes, write_json
+from embodied.house.contents import contents
 from embodied.house.house import House
 from embodied.house.shapes import footprint
 from embodied.scene.doors import metadata
@@ -47,13 +48,15 @@ def export_mjcf(
     Args:
       free: placements that physics may move, see embodied.scene.model.loose.
       lit: write the house with its baked light instead of its materials.
-      hinged: doors, drawers and lids move, and house_metadata.json says what bodies and joints are.
+      hinged: doors, drawers and lids move, furniture holds things, and house_metadata.json says what bodies and joints
+        are.
 
     Returns:
       The path of house.xml.
     """
     folder = Path(folder)
-    spec = build_spec(house, catalogue, free=free, lit=lit, hinged=hinged)
+    inside = contents(house, catalogue, hidden=True) if hinged else ()
+    spec = build_spec(house, catalogue, free=free, lit=lit, hinged=hinged, contents=inside)
     _add_cameras(spec, house)
     for element in (*spec.geoms, *spec.bodies, *spec.joints, *spec.cameras):
         element.name = element.name.replace("/", ".")

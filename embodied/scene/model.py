@@ -160,6 +160,7 @@ def build_spec(
     lit: LitPages | None = None,
     parts: Sequence[Part] | None = None,
     hinged: bool = False,
+    contents: Sequence[Placement] = (),
 ) -> mujoco.MjSpec:
     """The house as an MjSpec.
 
@@ -168,6 +169,7 @@ def build_spec(
       collisions, lit: as for `compile_scene`.
       hinged: doors turn on hinges, and what furniture has moves (embodied.scene.doors, cupboards); fixed without.
       parts: house_parts(house, catalogue) where the caller has them already.
+      contents: what lies in closed furniture that is hinged (embodied.house.contents).
 
     Raises:
       ValueError: `free` names something that is no placement; `lit` was baked for another house.
@@ -183,6 +185,7 @@ def build_spec(
     shell = parts or (shell_parts(house, catalogue.finish, apart) if hinged or collisions else ())
     hung = doors.hang(spec, house, shell) if hinged else {}
     cases = cupboards.hang(spec, house, catalogue, free) if hinged else {}
+    lying = list(cupboards.lying(cases, contents, catalogue))
     bodies = {p: Hung(_free_body(spec, house.placement_by_id[p]), (0.0, 0.0, 0.0)) for p in sorted(free)}
     if lit is None:
         _light(spec)
@@ -190,7 +193,7 @@ def build_spec(
         parts = house_parts(house, catalogue, apart) if parts is None else parts
         own = lambda p: bodies.get(p.owner) or (hung.get((p.owner, p.position)) if doors.is_leaf(p) else None)
         carried = [(p, own(p)) for p in parts if p.owner not in cases]
-        _add_parts(spec, [*carried, *(x for case in cases.values() if parts for x in cupboards.parts_of(case))])
+        _add_parts(spec, [*carried, *(x for case in cases.values() if parts for x in cupboards.parts_of(case)), *lying])
     else:
         spec.visual.headlight.active = 0
         spec.add_material(name=PROBE_LIT, emission=1.0, specular=0.0, shininess=0.0)
@@ -200,7 +203,7 @@ def build_spec(
         }
         frames |= {p: (house.placement_by_id[p], body) for p, body in bodies.items()}
         _add_pages(spec, lit, house, lambda m: _lit_pieces(m, frames, cases))
-        _add_insides(spec, cases)
+        _add_insides(spec, cases, lying)
     if collisions:
         _add_collisions(spec, house, catalogue, bodies, cases, YIELDING if hung else ())
         _add_leaves(spec, shell, hung)
@@ -413,9 +416,10 @@ def _lit_pieces(
     return [(dataclasses.replace(m, vertices=vertices), carrier)]
 
 
-def _add_insides(spec: mujoco.MjSpec, cases: Mapping[str, Case]) -> None:
-    """Draw insides of closed furniture, which were not lit, in a plain colour, as bodies added to a lit house."""
-    hidden = (x for case in cases.values() for x in cupboards.parts_of(case, hidden=True))
+def _add_insides(spec: mujoco.MjSpec, cases: Mapping[str, Case], lying: Sequence[tuple[Part, Hung]]) -> None:
+    """Draw insides of closed furniture and what lies there, which were not lit, in a plain colour, as bodies added to a
+    lit house."""
+    hidden = (*(x for case in cases.values() for x in cupboards.parts_of(case, hidden=True)), *lying)
     for k, (part, carrier) in enumerate(hidden):
         mesh, finish = part.mesh, part.mesh.finish
         color = (
