@@ -307,7 +307,8 @@ def test_nearly_all_of_a_house_opens_by_seventy_degrees_and_loose_things_rest_fo
     catalogue = load_catalogue(shared_cache)
     house = generate_house(seed, catalogue=catalogue)
     free, carry = takeable(house, catalogue), {p.parent for p in house.placements if "chair" not in (p.parent or "")}
-    aside = loose(house, catalogue) - carry
+    blinds = {p.id for p in house.placements if p.object_class == "window blind"}  # windows behind them stay shut
+    aside = (loose(house, catalogue) - carry) | blinds
     rest = build_spec(house, Unpainted(catalogue), hinged=True, free=free).compile()
     data = mujoco.MjData(rest)
     mujoco.mj_forward(rest, data)
@@ -325,8 +326,7 @@ def test_nearly_all_of_a_house_opens_by_seventy_degrees_and_loose_things_rest_fo
             met = (far for far in np.linspace(0, 1, 10)[1:] if _meets(model, data, j, far * reach, aside))
             widths[model.joint(j).name] = next(met, 1.0)
     narrow = {name: far for name, far in widths.items() if far < 70 / 90}
-    windows = [name for name in widths if name.startswith("window_")]  # what stands on a sill is in their way
-    assert len(narrow.keys() - windows) <= 0.06 * len(widths) and len(narrow.keys() & windows) < 0.7 * len(windows)
+    assert len(narrow) <= 0.06 * len(widths), narrow
     assert not any(re.match("door_", name) for name in narrow), narrow  # nobody is locked in
 
 

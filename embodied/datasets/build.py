@@ -1,7 +1,5 @@
 """Building a data set: one house is one unit of work, pure, resumable, the same on any number of workers."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import json

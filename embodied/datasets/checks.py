@@ -1,7 +1,5 @@
 """Checks that files of a data set are those that were written, and that an episode was played in its house."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

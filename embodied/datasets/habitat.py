@@ -7,8 +7,6 @@
 Habitat's frame has y up: (x, y, z) there is (x, z, -y) here. An agent looks along -z; rotations are (x, y, z, w).
 """
 
-from __future__ import annotations
-
 import gzip
 import itertools
 import json

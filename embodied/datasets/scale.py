@@ -1,7 +1,5 @@
 """The plan of a data set: its houses and splits, by kind of task and size."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

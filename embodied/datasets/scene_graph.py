@@ -1,7 +1,5 @@
 """A house as a 3D scene graph, and as a semantic map of each storey, for programs that reason about places."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from pathlib import Path

@@ -6,8 +6,6 @@
 A walk may leave the expert's way: what is written as the action is always what the expert does there (DAgger).
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator

@@ -229,16 +229,39 @@ class HelpEnv:
         if len(self._trail) <= self.time:
             self._trail.append(self.pose.node)
         left = None if self.budget is None else max(self.budget - self.requests, 0)
-        doing = self.world, self.task, self.pose, self.mode, self.targets, self.subtask
-        ways = tuple(p.node for p in poses), candidates
-        trail, known = tuple(self._trail), (self._truth(), self.closed)
-        self.situation = interface.Situation(*doing, *ways, self.time, self.requests, left, trail, "", *known)
-        aim = None if self.target is None else interface.Sight(self.target.world, self.target.node, picture=True)
-        sight, turn = interface.Sight(self.seen_from(self.pose.node), self.pose.node), self.pose.turn
-        stated = self.instruction, aim, self.mode, self._askable(self.situation), left, self.time, self.time_on_task
-        moved = bool(self._steps) and self._steps[-1].pose.node != self.pose.node
-        doors = self._extras(), tuple(barred), self._closable()
-        self.observation = interface.Observation(sight, turn, self.pose.tilt, candidates, *stated, moved, *doors)
+        self.situation = interface.Situation(
+            world=self.world,
+            task=self.task,
+            pose=self.pose,
+            mode=self.mode,
+            targets=self.targets,
+            subtask=self.subtask,
+            candidate_nodes=tuple(p.node for p in poses),
+            candidates=candidates,
+            time=self.time,
+            requests=self.requests,
+            requests_left=left,
+            trail=tuple(self._trail),
+            extras=self._truth(),
+            closed=self.closed,
+        )
+        self.observation = interface.Observation(
+            sight=interface.Sight(self.seen_from(self.pose.node), self.pose.node),
+            turn=self.pose.turn,
+            tilt=self.pose.tilt,
+            candidates=candidates,
+            instruction=self.instruction,
+            target=None if self.target is None else interface.Sight(self.target.world, self.target.node, picture=True),
+            mode=self.mode,
+            can_ask=self._askable(self.situation),
+            requests_left=left,
+            time=self.time,
+            time_on_task=self.time_on_task,
+            moved=bool(self._steps) and self._steps[-1].pose.node != self.pose.node,
+            extras=self._extras(),
+            can_open=tuple(barred),
+            can_close=self._closable(),
+        )
         return self.observation
 
     def _barred(self, candidate: int) -> tuple[str, ...]:

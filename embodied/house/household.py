@@ -1,7 +1,5 @@
 """Who lives in a house: how many, how old, and what they like doing; what lies about follows from it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
