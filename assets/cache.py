@@ -1,7 +1,5 @@
 """The on-disk cache: content-keyed, written atomically, safe to delete at any time."""
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import functools

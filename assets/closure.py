@@ -4,8 +4,6 @@ Products that are kept on disk carry `code_digest` of the module that made them 
 other code is believed. Comments, docstrings and formatting do not count.
 """
 
-from __future__ import annotations
-
 import ast
 import functools
 import importlib.metadata

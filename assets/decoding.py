@@ -4,8 +4,6 @@
 reads: rows filtered otherwise. It checks the sum of the pixels, not those of chunks.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import struct

@@ -4,8 +4,6 @@ What is read has the types of its fields, finite numbers, no unknown, missing or
 of RECORD_RULES. Every failure is a RecordError, which names the file.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import functools

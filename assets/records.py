@@ -1,7 +1,5 @@
 """The asset records: what a thing is, how it looks, where it may stand, how a model is imported."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Rows of the tables in assets/data and of users' catalogue.json: laid over one another, made Assets and Recipes."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Collection, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Angles, yaw rotations and flat polygons. Radians, metres, counter-clockwise."""
 
-from __future__ import annotations
-
 from typing import Any, overload
 
 import numpy as np

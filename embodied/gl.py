@@ -4,8 +4,6 @@ EGL is preferred (it uses a GPU where one is, Mesa's software rasteriser elsewhe
 fall-back. MUJOCO_GL, MuJoCo's own switch, is honoured when the user has set it to either.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import ctypes

@@ -1,7 +1,5 @@
 """One writer per folder: a lock that says whose it is and ends with its process, however that ends."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import fcntl

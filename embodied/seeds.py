@@ -1,7 +1,5 @@
 """The one source of randomness: named generators derived from an integer seed. And what is kept from learning."""
 
-from __future__ import annotations
-
 import hashlib
 import operator
 from collections.abc import Collection, Iterable, Sequence

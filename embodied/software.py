@@ -6,8 +6,6 @@ libatomic, which Dr.Jit's wheel expects of the system, is unpacked from Debian's
 the furniture libraries where pip finds no wheel of them.
 """
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import ctypes.util

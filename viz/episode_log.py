@@ -1,8 +1,6 @@
 """Facts for a viewer at a step that the step alone does not say, who said what and what is being aimed at; episodes as
 text."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The house as light meshes for the viewer: few triangles, colours in the vertices, no ceilings."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass

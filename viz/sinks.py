@@ -1,7 +1,5 @@
 """Targets of a recording, a file, a running viewer, or both, and how viewers lay it out."""
 
-from __future__ import annotations
-
 import contextlib
 import socket
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Off-screen rollouts as video, with smooth camera motion between the nodes of the graph."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path

@@ -1,8 +1,6 @@
 """Who opens into whom: the doors and open joins that make a plan walkable without crossing private rooms; and how well
 a plan would please an architect: one number from areas, proportions, daylight and neighbours."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

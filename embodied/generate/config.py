@@ -1,7 +1,5 @@
 """HouseConfig: what a caller may fix about a house; everything left out is drawn from the seed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from embodied.generate.novelty import styles_of

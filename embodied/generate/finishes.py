@@ -3,8 +3,6 @@
 Names of materials only ('oak_planks/0'); embodied.assets.materials makes them.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from dataclasses import dataclass

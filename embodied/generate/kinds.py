@@ -3,8 +3,6 @@
 The table is kinds.toml beside this module, furniture is furnish/rooms.toml. docs/houses.md says how to add a kind.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

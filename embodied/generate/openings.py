@@ -1,7 +1,5 @@
 """Doors, passages and windows of a plan: where they sit in their walls, how wide, which way they swing."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence

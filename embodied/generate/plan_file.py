@@ -7,8 +7,6 @@ another polygon with right angles. A house has at least one hall, where one ente
 a stair is a room of kind 'stairwell' on each of the storeys that it joins, with the same polygon.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

@@ -1,7 +1,5 @@
 """The room program: which rooms a house of a given area has, how large each, and who owns whom."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

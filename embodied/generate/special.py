@@ -1,7 +1,5 @@
 """Rooms of a plan that are no boxes: living and dining room as one in the shape of an L, and bays."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Walkways stay free: what blocks the way into a room is taken out again, the least important things first."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

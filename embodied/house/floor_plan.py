@@ -3,8 +3,6 @@
 paint_plan(house).save("plan.png")
 """
 
-from __future__ import annotations
-
 import functools
 import importlib.util
 import io

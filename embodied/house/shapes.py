@@ -1,7 +1,5 @@
 """The records of a house as shapes on the floor: what an object covers, which way an opening faces."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 

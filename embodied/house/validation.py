@@ -1,7 +1,5 @@
 """Houses from files: checks that they name things that exist, and the lightings that are kept beside them."""
 
-from __future__ import annotations
-
 import dataclasses
 import difflib
 import logging

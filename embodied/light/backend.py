@@ -4,8 +4,6 @@ Mitsuba's variants compile kernels: `cuda_ad_rgb` where a GPU is, else `llvm_ad_
 needs a shared libLLVM of version 15 or later (`embodied doctor --fix`, or Debian: `apt install libllvm19`).
 """
 
-from __future__ import annotations
-
 import ctypes
 import ctypes.util
 import functools

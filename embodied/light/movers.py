@@ -9,8 +9,6 @@ Source: transfer in spherical harmonics: P.-P. Sloan, J. Kautz and J. Snyder, Pr
 discs that occlude: M. Bunnell, Dynamic ambient occlusion and indirect lighting (GPU Gems 2, 2005).
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import importlib

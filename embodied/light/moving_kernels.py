@@ -1,8 +1,6 @@
 """The loops of embodied.light.moving over texels and discs, compiled by Numba (extra [numba]): the same within one of
 255, sooner."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

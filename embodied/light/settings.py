@@ -1,7 +1,5 @@
 """How finely and how long a house is lit."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

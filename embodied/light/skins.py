@@ -1,7 +1,5 @@
 """People in light: a surface that follows the skin of its owner from pose to pose."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

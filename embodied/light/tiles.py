@@ -1,7 +1,5 @@
 """Pages of a house as what takes light: places and normals under their luxels, in tiles that change one by one."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias

@@ -1,7 +1,5 @@
 """Light on bodies in MuJoCo's own viewer and renderer, which know no probes: one colour a geom."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 

@@ -1,7 +1,5 @@
 """The pages of a house side by side in one large picture, with smaller copies of it to its right."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -5,8 +5,6 @@ whose surfaces face another way stay apart; where surface is lost all the same (
 no copy.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TypeAlias
 

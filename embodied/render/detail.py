@@ -6,8 +6,6 @@ in the world, along the surface's axes, so that it stays where it is from frame 
 pixel is wide, and its factors are 1 in the mean, so that light, depth and ids stay.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 

@@ -1,7 +1,5 @@
 """Between light and what a picture shows of it: the film curve of a bake for greys, and back."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The pixel loops of embodied.render.sampling, compiled by Numba (extra [numba]): the same numbers, sooner."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Light that a picture's surfaces mirror, in half its size: averaged over a surface's neighbours, and enlarged."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import cv2

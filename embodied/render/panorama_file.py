@@ -10,8 +10,6 @@ length, its SHA-256 and the magic again. Per node three pictures with the six fa
 Every picture carries a CRC-32 that is checked when it is read.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import json

@@ -6,8 +6,6 @@ once (`camera_traits`); what differs from one picture to the next, the noise, is
 the lens (`PhotoCamera.bent`) and nothing else.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import dataclass

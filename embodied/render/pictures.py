@@ -1,7 +1,5 @@
 """How pictures of a house are made: without light, in baked light, or by tracing rays."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 from collections.abc import Mapping

@@ -5,8 +5,6 @@ state at every geom, and reads a page for every pixel of the blocks that a trian
 buffer, and OpenGL notes for every pixel only which texel of the atlas is in front; OpenCV reads them.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 from collections.abc import Collection, Mapping, Sequence

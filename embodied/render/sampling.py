@@ -4,8 +4,6 @@ Faces have side s and borders of a pixel, and lie below each other. Numbers are 
 in the same order here and in embodied.render.kernels, so that pictures are the same with Numba and without.
 """
 
-from __future__ import annotations
-
 import functools
 import importlib
 import math

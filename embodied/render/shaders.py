@@ -1,7 +1,5 @@
 """The shaders of embodied.render.raster: what runs for every corner and every pixel of a lit house."""
 
-from __future__ import annotations
-
 CORNERS = """#version 330
 layout(location = 0) in vec3 xyz;
 layout(location = 1) in vec2 at;

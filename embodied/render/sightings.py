@@ -1,7 +1,5 @@
 """Sightings: which objects can be seen from a node, where and how large. Cheap, from a small id picture."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 That is cheaper there than multi-sampling, which multiplies the cost of every small triangle, and smoother.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 

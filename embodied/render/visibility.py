@@ -4,8 +4,6 @@ Everything errs on the safe side (furniture, wall thickness, lintels and closed 
 what is left out is never missed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

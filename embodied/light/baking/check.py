@@ -1,7 +1,5 @@
 """The bake against the path tracer at random luxels of walls, floors and ceilings."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from embodied.light.backend import LightError, array

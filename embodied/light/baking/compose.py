@@ -1,7 +1,5 @@
 """From light to pages: albedo times light at texel size, sharp sun, reflections, exposure."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ materials, the settings and the code that bakes (`embodied.light.settings.light_
 `embodied.light.pages.files`'; an interrupted bake goes on where it stopped.
 """
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import functools

@@ -3,8 +3,6 @@
 The same lights as in `radiosity`, but one ray serves all normals that a place's light is asked for.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable

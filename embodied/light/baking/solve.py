@@ -1,7 +1,5 @@
 """From an atlas to light: every luxel's e, by stages that can be kept on disk and taken up again."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field

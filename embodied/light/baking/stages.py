@@ -1,7 +1,5 @@
 """Stages of a bake that was interrupted, and what the manifest says of one that is done."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The view through windows: a dome with the painted outdoors, and the house's own outer parts in daylight."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ A page is one texture. Things of one room that want the same fineness share page
 keeps its own triangles, so that instance ids and culling by room go on working.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

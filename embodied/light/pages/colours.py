@@ -1,7 +1,5 @@
 """Colours: sRGB and linear light, and the reflectance under the texels of a page, looked up on the device."""
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The surface under every texel of a page: which face, where on it, and the surface there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

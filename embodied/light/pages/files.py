@@ -4,8 +4,6 @@ Every stage is a file of its own, written whole or not at all; manifest.json is 
 its checksum.
 """
 
-from __future__ import annotations
-
 import functools
 import zlib
 from collections.abc import Mapping, Sequence

@@ -5,8 +5,6 @@ colour channel that changes smoothly through doors and openings, so that texture
 shown with it and never show a step.
 """
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass
 

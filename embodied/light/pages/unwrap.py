@@ -4,8 +4,6 @@ Furniture goes through xatlas once per geometry and is cached; walls, floors and
 unfolded plane by plane, so that one wall is one chart however many holes it has.
 """
 
-from __future__ import annotations
-
 import itertools
 import sys
 import time

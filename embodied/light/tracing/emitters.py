@@ -3,8 +3,6 @@
 All intensities are radiosities or radiances in units of 100 cd/m2 (see sky.py).
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

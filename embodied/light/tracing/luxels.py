@@ -1,7 +1,5 @@
 """Luxels: the surface under every texel of light of a house."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 

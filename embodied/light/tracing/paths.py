@@ -4,8 +4,6 @@ Every vertex asks every light once and goes on in a random direction. Surfaces a
 diffuse below one GGX lobe (Walter et al. 2007) with Schlick's Fresnel term.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

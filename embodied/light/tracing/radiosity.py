@@ -7,8 +7,6 @@ Source: steps 6 to 11 of the bake prototype's recipe; the last gather is final g
 radiosity solution (Reichert 1992).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

@@ -3,8 +3,6 @@
 Both return an embodied.render.panorama.Panorama with the bake's exposure, so that pictures compare.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ Radiance is in units of 100 cd/m2 throughout `embodied.light`: daylight skies li
 white wall by lamplight around 0.3.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2
