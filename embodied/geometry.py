@@ -1,37 +1,27 @@
 """Angles, yaw rotations and flat polygons. Radians, metres, counter-clockwise."""
 
-from typing import Any, overload
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
 TWO_PI = 2.0 * np.pi
+Angles = TypeVar("Angles", float, np.ndarray)
+"""Of a number NumPy's float64 comes back, which is a float."""
 
 
-@overload
-def wrap(angle: float) -> np.float64: ...
-@overload
-def wrap(angle: np.ndarray) -> np.ndarray: ...
-def wrap(angle: float | np.ndarray) -> np.floating | np.ndarray:
+def wrap(angle: Angles) -> Angles:
     """Angle(s) brought into [-pi, pi)."""
-    return (np.asarray(angle) + np.pi) % TWO_PI - np.pi
+    return cast(Angles, (np.asarray(angle) + np.pi) % TWO_PI - np.pi)
 
 
-@overload
-def heading_of_yaw(yaw: float) -> np.float64: ...
-@overload
-def heading_of_yaw(yaw: np.ndarray) -> np.ndarray: ...
-def heading_of_yaw(yaw: float | np.ndarray) -> np.floating | np.ndarray:
+def heading_of_yaw(yaw: Angles) -> Angles:
     """Matterport heading (clockwise from +y, in [0, 2 pi)) of a yaw (ccw from +x)."""
-    return (np.pi / 2 - np.asarray(yaw)) % TWO_PI
+    return cast(Angles, (np.pi / 2 - np.asarray(yaw)) % TWO_PI)
 
 
-@overload
-def yaw_of_heading(heading: float) -> np.float64: ...
-@overload
-def yaw_of_heading(heading: np.ndarray) -> np.ndarray: ...
-def yaw_of_heading(heading: float | np.ndarray) -> np.floating | np.ndarray:
+def yaw_of_heading(heading: Angles) -> Angles:
     """Yaw (ccw from +x, in [-pi, pi)) of a Matterport heading (clockwise from +y)."""
-    return wrap(np.pi / 2 - np.asarray(heading))
+    return cast(Angles, wrap(np.pi / 2 - np.asarray(heading)))
 
 
 def r2(k: Any) -> tuple[Any, Any]:

@@ -177,7 +177,7 @@ def test_an_unknown_asset_is_named(catalogue):
 
 def test_a_concave_polygon_is_filled_exactly():
     u = "v 0 0 0\nv 3 0 0\nv 3 0 3\nv 2 0 3\nv 2 0 1\nv 1 0 1\nv 1 0 3\nv 0 0 3\nf 8 7 6 5 4 3 2 1"
-    obj = parse_obj(u, "u")
+    obj = parse_obj(u.encode(), "u")
     corners = obj.vertices[obj.groups[0].corners]
     areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert np.abs(areas).sum() == pytest.approx(7.0)

@@ -18,7 +18,7 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.generate import HouseConfig
 from embodied.house.house import LANDSCAPES, SEASONS, House, HouseError, Sky
 from embodied.light.tracing.sky import paint
-from embodied.scene import backdrop, far_canvas
+from embodied.scene import far_canvas
 from embodied.scene.landscapes import TABLE, Scenery, near_buildings, scenery_of
 from embodied.scene.model import build_spec, compile_scene, owner_of_name
 from embodied.scene.outdoors import PIECES, footprint, outdoor_parts
@@ -86,7 +86,7 @@ def test_each_landscape_compiles_and_stands_outside_the_house(two_room_house, la
         assert p.owner.removeprefix("outdoor/") in PIECES
         c, s = np.cos(p.yaw), np.sin(p.yaw)
         xy = p.mesh.vertices[:, :2] @ np.array([[c, s], [-s, c]]) + p.position[:2]
-        assert np.abs(xy).max() < 0.8 * backdrop.DOME_RADIUS
+        assert np.abs(xy).max() < 0.8 * far_canvas.DOME_RADIUS
         if p.owner in ("outdoor/trees", "outdoor/neighbours", "outdoor/windows", "outdoor/street", "outdoor/border"):
             assert not shapely.contains_xy(inner.buffer(1.0), xy).any(), p.mesh_key
     model = build_spec(house, catalogue, collisions=False).compile()
@@ -95,12 +95,12 @@ def test_each_landscape_compiles_and_stands_outside_the_house(two_room_house, la
 
 def test_the_dome_has_no_id_and_a_ray_out_of_the_window_ends_on_it(two_room_house):
     scene = compile_scene(at(two_room_house, "lake"), load_catalogue(), collisions=False)
-    dome = [g for g in range(scene.model.ngeom) if owner_of_name(scene.model.geom(g).name) == backdrop.DOME]
+    dome = [g for g in range(scene.model.ngeom) if owner_of_name(scene.model.geom(g).name) == far_canvas.DOME]
     assert len(dome) == 1 and scene.owner_of_geom[dome[0]] == 0 and scene.room_of_geom[dome[0]] == ""
     data, hit = mujoco.MjData(scene.model), np.zeros(1, np.int32)
     mujoco.mj_forward(scene.model, data)
     away = mujoco.mj_ray(scene.model, data, np.array([2.5, -30.0, 2.0]), np.array([0.0, -1.0, 0.0]), None, 1, -1, hit)
-    assert hit[0] == dome[0] and 0.9 * backdrop.DOME_RADIUS - 32 < away < backdrop.DOME_RADIUS
+    assert hit[0] == dome[0] and 0.9 * far_canvas.DOME_RADIUS - 32 < away < far_canvas.DOME_RADIUS
 
 
 def test_neighbours_do_not_overlap_the_plot_and_only_three_landscapes_have_them(two_room_house):

@@ -221,7 +221,7 @@ def star(corners: int) -> np.ndarray:
 def test_a_polygon_of_a_thousand_corners_is_filled_exactly():
     points = star(1000)
     text = "\n".join([*(f"v {x:.12f} 0 {-y:.12f}" for x, y in points), "f " + " ".join(map(str, range(1, 1001)))])
-    (group,) = parse_obj(text, "star").groups
+    (group,) = parse_obj(text.encode(), "star").groups
     a, b, c = points[group.corners].transpose(1, 0, 2)
     area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
     x, y = points.T
@@ -232,7 +232,7 @@ def test_a_polygon_of_a_thousand_corners_is_filled_exactly():
 def test_a_polygon_of_more_corners_than_are_read_is_refused():
     text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf " + "1 2 3 " * (MAX_CORNERS // 3 + 1)
     with pytest.raises(MeshError, match=f"at most {MAX_CORNERS} are read"):
-        parse_obj(text, "large")
+        parse_obj(text.encode(), "large")
 
 
 def fan(faces: int) -> tuple[np.ndarray, np.ndarray]:

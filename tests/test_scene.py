@@ -17,7 +17,7 @@ from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import Placement
 from embodied.scene import collision
 from embodied.scene import model as scene
-from embodied.scene.backdrop import DOME
+from embodied.scene.far_canvas import DOME
 from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.lit_pages import LitMesh, LitPages
 

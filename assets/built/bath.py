@@ -11,6 +11,7 @@ from embodied.assets.built.primitives import (
     box,
     cylinder,
     extruded,
+    facets,
     joined,
     lathe,
     quads,
@@ -250,12 +251,8 @@ def _faceted(vertices: np.ndarray, faces: np.ndarray) -> Shape:
     """Triangles with a normal each, as paper has that was crumpled; corners that lie together stay together."""
     ways = np.round(vertices / np.linalg.norm(vertices, axis=1, keepdims=True), 4)
     _, first, weld = np.unique(ways, axis=0, return_index=True, return_inverse=True)
-    corners = vertices[first][weld.reshape(-1)][faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sound = np.linalg.norm(normals, axis=1) > 1e-12
-    corners, normals = corners[sound], normals[sound] / np.linalg.norm(normals[sound], axis=1, keepdims=True)
-    points, normals = corners.reshape(-1, 3), np.repeat(normals, 3, axis=0)
-    return Shape(points, np.arange(len(points)).reshape(-1, 3), normals, points[:, :2])
+    flat = facets(vertices[first][weld.reshape(-1)][faces])
+    return Shape(flat.vertices, flat.faces, flat.normals, flat.vertices[:, :2])
 
 
 def _pedal_bin(w: float, d: float, h: float, main: Finish) -> list[FinishedShapes]:

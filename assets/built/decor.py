@@ -7,19 +7,7 @@ import shapely
 from scipy.interpolate import PchipInterpolator
 
 from embodied.assets.built.parametric import BuildRequest, parts_of, plain, whole_image
-from embodied.assets.built.primitives import (
-    Shape,
-    ball,
-    between,
-    box,
-    cylinder,
-    flat,
-    frame,
-    lathe,
-    sheet,
-    tube,
-    upright,
-)
+from embodied.assets.built.primitives import Shape, ball, border, box, flat, frame, lathe, sheet, tube, upright
 from embodied.assets.records import MeshPart, Size
 
 
@@ -32,8 +20,8 @@ def picture(spec: BuildRequest) -> list[MeshPart]:
     y0, y1 = -d / 2, d / 2
     moulding = []
     lines = [(0.0, y1), (0.0, y0 + 0.004), (0.25 * f, y0), (0.8 * f, y0 + 0.001), (f, y0 + 0.006), (f, y0 + 0.012)]
-    for (a, ya), (b, yb) in itertools.pairwise(lines):
-        strip = between(_inset(w, h, a, ya), _inset(w, h, b, yb))
+    for outer, inner in itertools.pairwise(lines):
+        strip = border(-w / 2, w / 2, 0, h, outer, inner)
         upright_grain = (np.arange(len(strip.uv)) // 4 % 2 == 1)[:, None]
         uv = np.where(upright_grain, strip.uv[:, ::-1], strip.uv)
         moulding.append(Shape(strip.vertices, strip.faces, strip.normals, uv))
@@ -42,14 +30,8 @@ def picture(spec: BuildRequest) -> list[MeshPart]:
     g = f + m
     x0, x1, z0, z1 = -w / 2 + g, w / 2 - g, g, h - g
     image = whole_image(upright(x0, x1, z0, z1, y0 + 0.0125), art, x0, x1, z0, z1)
-    mat = [between(_inset(w, h, f, y0 + 0.012), _inset(w, h, g, y0 + 0.012))] if m > 0 else []
+    mat = [border(-w / 2, w / 2, 0, h, (f, y0 + 0.012), (g, y0 + 0.012))] if m > 0 else []
     return parts_of((wood, moulding), ("paper", [*mat, back]), (art, image))
-
-
-def _inset(w: float, h: float, by: float, y: float) -> list[tuple[float, float, float]]:
-    """Corners at y of a rectangle w wide and h high, less `by` on all sides."""
-    x0, x1, z0, z1 = -w / 2 + by, w / 2 - by, by, h - by
-    return [(x0, y, z0), (x1, y, z0), (x1, y, z1), (x0, y, z1)]
 
 
 def canvas(spec: BuildRequest) -> list[MeshPart]:
@@ -80,7 +62,8 @@ def mirror(spec: BuildRequest) -> list[MeshPart]:
         disc = lathe([(0.5 - f / w, 0), (0, 0)], 48)
         disc = disc.turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, y0 + 0.006, h / 2)
         disc = Shape(disc.vertices, disc.faces, np.tile([0.0, -1.0, 0.0], (len(disc.vertices), 1)), disc.uv)
-        back = cylinder(0.49, 0, 0.004, 0, 32).turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, d / 2, h / 2)
+        back = lathe([(0, 0), (0.49, 0), (0.49, 0.004), (0, 0.004)], 32)
+        back = back.turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, d / 2, h / 2)
         return parts_of((rim, ring), ("black", back), ("mirror", disc))
     x, boards = w / 2 - f, frame(-w / 2, w / 2, 0, h, (y0, d / 2), f, 0.002)
     glass, back = upright(-x, x, f, h - f, y0 + 0.006), upright(x, -x, f, h - f, d / 2)

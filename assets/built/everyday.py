@@ -3,20 +3,7 @@
 import numpy as np
 
 from embodied.assets.built.parametric import TINTS, BuildRequest, FinishedShapes, parts_of, plain
-from embodied.assets.built.primitives import (
-    Shape,
-    ball,
-    between,
-    box,
-    cylinder,
-    frame,
-    joined,
-    lathe,
-    quads,
-    rim,
-    sheet,
-    tube,
-)
+from embodied.assets.built.primitives import Shape, ball, box, cylinder, frame, joined, lathe, quads, sheet, skirt, tube
 from embodied.assets.records import Finish, MeshPart, Size
 
 
@@ -200,10 +187,9 @@ def _crumpled(size: Size, cells: int, roundness: float, *, rng: np.random.Genera
     rise = height * (0.22 + 0.78 * ridges / ridges.max()) * np.clip(1 - square**6, 0, 1) ** 0.5 + 0.004
     axes = ((width / 2, x, np.cos(a)), (depth / 2, y, np.sin(a)))
     px, py = (half * reach * ((1 - roundness) * u + roundness * square * v) for half, u, v in axes)
-    top = sheet(np.stack([px, py, rise], -1))
+    grid = np.stack([px, py, rise], -1)
     low = sheet(np.stack([px, py, 0 * rise], -1))
-    up = rim(np.stack([px, py, rise], -1))
-    return joined(top, low.reversed(), between(up * [1, 1, 0], up)).shifted_uv(*rng.random(2))
+    return joined(sheet(grid), low.reversed(), skirt(grid)).shifted_uv(*rng.random(2))
 
 
 def thrown_clothes(spec: BuildRequest) -> list[MeshPart]:

@@ -66,7 +66,7 @@ def base(spec: BuildRequest) -> list[MeshPart]:
         else:
             doors.append(front(a, b, z0, z1, y, style))
             left = (b + a) / 2 > 0 or columns == 1
-            grips.append(handle(a + 0.04 if left else b - 0.04, z1 - 0.12, y, _on_door(grip), True))
+            grips.append(handle(a + 0.04 if left else b - 0.04, z1 - 0.12, y, grip, True))
     return _base(spec, h, doors, grips)
 
 
@@ -76,7 +76,7 @@ def corner(spec: BuildRequest) -> list[MeshPart]:
     y, z0, z1 = -d / 2 + 0.002, PLINTH[0], h - TOP - 0.003
     style = spec.word("style", "flat")
     doors = [front(-w / 2, 0, z0, z1, y, style), box([0.0, y, z0], [w / 2, y + 0.02, z1], 0.001)]
-    grips = [handle(-0.05, z1 - 0.12, y, _on_door(spec.word("handle", "bar")), True)]
+    grips = [handle(-0.05, z1 - 0.12, y, spec.word("handle", "bar"), True)]
     return _base(spec, h, doors, grips)
 
 
@@ -122,7 +122,7 @@ def sink(spec: BuildRequest) -> list[MeshPart]:
     pair = w > 0.7
     edges = [-w / 2, 0, w / 2] if pair else [-w / 2, w / 2]
     doors = [front(a, b, z0, z1, y, style) for a, b in itertools.pairwise(edges)]
-    grips = [handle(x, z1 - 0.12, y, _on_door(grip), True) for x in ((-0.05, 0.05) if pair else (w / 2 - 0.045,))]
+    grips = [handle(x, z1 - 0.12, y, grip, True) for x in ((-0.05, 0.05) if pair else (w / 2 - 0.045,))]
     return _base(spec, h, doors, grips, worktop, (("steel", [*rim, basin, drain]), ("chrome", tap)))
 
 
@@ -205,7 +205,7 @@ def wall_cabinet(spec: BuildRequest) -> list[MeshPart]:
         else:
             doors.append(front(a, b, 0, h, y, style))
         left = columns > 1 and k % 2 == 1
-        grips.append(handle(a + 0.035 if left else b - 0.035, 0.12, y, _on_door(grip), True))
+        grips.append(handle(a + 0.035 if left else b - 0.035, 0.12, y, grip, True))
     if spec.params.get("glazed"):
         heights = np.linspace(0, h, 4)[1:-1]
         inside = [box([-w / 2 + 0.018, y + 0.05, z], [w / 2 - 0.018, d / 2 - 0.01, z + 0.018]) for z in heights]
@@ -254,7 +254,7 @@ def tall_cabinet(spec: BuildRequest) -> list[MeshPart]:
     edges = np.linspace(-w / 2, w / 2, max(1, round(w / 0.6)) + 1)
     rows = ((PLINTH[0], cut), (cut, h))
     doors = [front(a, b, z0, z1, y, style) for a, b in itertools.pairwise(edges) for z0, z1 in rows]
-    grips = [handle(b - 0.04, z, y, _on_door(grip), True) for b in edges[1:] for z in (cut - 0.12, cut + 0.2)]
+    grips = [handle(b - 0.04, z, y, grip, True) for b in edges[1:] for z in (cut - 0.12, cut + 0.2)]
     side = box([-w / 2, y + 0.022, 0], [w / 2, d / 2, h], 0.002)
     return parts_of((spec.material("front", "lacquer_white/0"), [*doors, side]), joints(doors), (spec.metal(), grips))
 
@@ -372,7 +372,7 @@ def island(spec: BuildRequest) -> list[MeshPart]:
     for k, (a, b) in enumerate(itertools.pairwise(edges)):
         if k % 2:
             doors.append(front(a, b, z0, z1, y, style))
-            grips.append(handle(a + 0.04, z1 - 0.12, y, _on_door(grip), True))
+            grips.append(handle(a + 0.04, z1 - 0.12, y, grip, True))
         else:
             for q0, q1 in ((0, 0.4), (0.4, 0.75), (0.75, 1)):
                 doors.append(front(a, b, z0 + q0 * (z1 - z0), z0 + q1 * (z1 - z0), y, style))
@@ -408,8 +408,3 @@ def hood(spec: BuildRequest) -> list[MeshPart]:
         (plain((0.45, 0.45, 0.45), 0.4, 1.0), filters),
         (plain((0.95, 0.93, 0.88), 0.3), lamps),
     )
-
-
-def _on_door(style: str) -> str:
-    """Cups belong on drawers; the doors beside them have knobs."""
-    return "knob" if style == "cup" else style

@@ -132,9 +132,8 @@ def magazine(spec: BuildRequest) -> list[MeshPart]:
     grid = np.stack([x, y, h * (0.55 + 0.45 * ((x + w / 2) / w) ** 2)], -1)
     cover = spec.material("cover", "magazine_cover/0")
     top = whole_image(primitives.sheet(grid), cover, -w / 2, w / 2, -d / 2, d / 2, "xy", keep_aspect=False)
-    edge = primitives.between(primitives.rim(grid) * [1, 1, 0], primitives.rim(grid))
     base = primitives.quads([[(-w / 2, d / 2, 0), (w / 2, d / 2, 0), (w / 2, -d / 2, 0), (-w / 2, -d / 2, 0)]])
-    return parts_of((cover, top), ("paper", [edge, base]))
+    return parts_of((cover, top), ("paper", [primitives.skirt(grid), base]))
 
 
 def papers(spec: BuildRequest) -> list[MeshPart]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from embodied.assets.built.primitives import Shape, between, box, fitted, frame, joined, lathe, outline, part, tube
+from embodied.assets.built.primitives import Shape, border, box, fitted, frame, joined, lathe, part, tube
 from embodied.assets.json_file import from_plain, read_toml
 from embodied.assets.records import Asset, Color, Finish, MeshPart, Size, SupportSurface
 
@@ -154,14 +154,13 @@ def joints(fronts: Sequence[Shape]) -> tuple[str, list[Shape]]:
     frames = []
     for shape in fronts:
         (x0, y, z0), (x1, _, z1) = shape.vertices.min(0), shape.vertices.max(0)
-        outer, inner = (outline(x0 + by, x1 - by, z0 + by, z1 - by, y + 0.003) for by in (-0.002, 0.0018))
-        frames.append(between(outer, inner))
+        frames.append(border(x0, x1, z0, z1, (-0.002, y + 0.003), (0.0018, y + 0.003)))
     return "gap", frames
 
 
 def handle(x: float, z: float, y: float, style: str = "bar", upright: bool = False, length: float = 0.14) -> Shape:
-    """A handle on a front at y: 'bar', 'knob' or 'cup'."""
-    if style == "knob":
+    """A handle on a front at y: 'bar', 'knob' or 'cup'; cups belong on drawers, the doors beside them have knobs."""
+    if style == "knob" or (style == "cup" and upright):
         knob = [(0, 0), (0.006, 0), (0.0055, 0.012), (0.014, 0.018), (0.015, 0.024), (0.011, 0.029), (0, 0.03)]
         return lathe(knob, 12).hung(x, y, z)
     if style == "cup":

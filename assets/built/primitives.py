@@ -118,9 +118,23 @@ def quads(corners: ArrayLike, uv: np.ndarray | None = None) -> Shape:
     return Shape(vertices, faces, normals, uv)
 
 
+def facets(corners: ArrayLike) -> Shape:
+    """Flat triangles (m, 3, 3), counter-clockwise, but for those without area; uv projected as of `quads`."""
+    p = np.asarray(corners, float)
+    normals = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    sound = np.linalg.norm(normals, axis=1) > 1e-12
+    vertices, normals = p[sound].reshape(-1, 3), np.repeat(_unit(normals[sound]), 3, axis=0)
+    return Shape(vertices, np.arange(len(vertices)).reshape(-1, 3), normals, projected_uv(vertices, normals))
+
+
 def outline(x0: float, x1: float, z0: float, z1: float, y: float) -> list[tuple[float, float, float]]:
     """Corners of an upright rectangle at y."""
     return [(x0, y, z0), (x1, y, z0), (x1, y, z1), (x0, y, z1)]
+
+
+def border(x0: float, x1: float, z0: float, z1: float, outer: tuple[float, float], inner: tuple[float, float]) -> Shape:
+    """A strip around an upright rectangle; its edges lie so far inside the rectangle, at a y."""
+    return between(*(outline(x0 + by, x1 - by, z0 + by, z1 - by, y) for by, y in (outer, inner)))
 
 
 def upright(x0: float, x1: float, z0: float, z1: float, y: float) -> Shape:
@@ -415,6 +429,11 @@ def sheet(points: np.ndarray, thickness: float = 0.0) -> Shape:
         return front
     q = p - normals * thickness
     return joined(front, _grid(q, normals, uv).reversed(), between(rim(q), rim(p)))
+
+
+def skirt(grid: np.ndarray) -> Shape:
+    """The sides from the border of a grid of points (r, c, 3) straight down to the floor."""
+    return between(rim(grid) * [1, 1, 0], rim(grid))
 
 
 def rim(grid: np.ndarray) -> np.ndarray:

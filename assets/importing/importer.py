@@ -23,28 +23,9 @@ from scipy.sparse.csgraph import connected_components
 from embodied.assets.cache import atomic_path, digest, write_bytes, write_json
 from embodied.assets.closure import code_digest
 from embodied.assets.decoding import open_arrays
-from embodied.assets.importing.looks import (
-    COVERS,
-    FOLDED,
-    corrected,
-    cover_of,
-    creased,
-    finish_of,
-    kind_of,
-    laid_on,
-    picture,
-)
+from embodied.assets.importing.looks import COVERS, FOLDED, corrected, cover_of, creased, finish_of, laid_on, picture
 from embodied.assets.importing.meshing import CREASE, crease_normals, decimate, face_normals, indexed, sound_faces, weld
-from embodied.assets.importing.obj import (
-    MaterialFaces,
-    MeshError,
-    MtlMaterial,
-    Obj,
-    decoded,
-    libraries,
-    parse_mtl,
-    parse_obj,
-)
+from embodied.assets.importing.obj import MaterialFaces, MeshError, MtlMaterial, Obj, libraries, parse_mtl, parse_obj
 from embodied.assets.importing.rounding import FINE, folded, is_coarse, refined, rounded
 from embodied.assets.importing.sh3f import Pack, PackError
 from embodied.assets.importing.textures import cut, filled, palette, shrunk, tinted
@@ -151,7 +132,7 @@ def read_obj(
       MeshError, PackError: damaged or missing files.
     """
     folder = PurePosixPath(name).parent
-    obj = parse_obj(decoded(read(name)), where)
+    obj = parse_obj(read(name), where)
     own, say = tell is not None, tell or (lambda words: None)
     materials: dict[str, MtlMaterial] = {}
     for statement in obj.libraries:
@@ -160,7 +141,7 @@ def read_obj(
         if not contents:
             say(f"its material library {statement!r} is not there; put it beside the model")
         for data in contents:
-            materials |= parse_mtl(decoded(data))
+            materials |= parse_mtl(data)
     for words in obj.left_out:
         say(words)
     pictures = _Pictures(read, folder, remedy, say)
@@ -258,10 +239,10 @@ class _Pictures:
 def obj_files(read: Reader, name: str) -> tuple[str, ...]:
     """The MTL files and textures that the OBJ file `name` names, whether they are there or not."""
     folder, files = PurePosixPath(name).parent, []
-    for statement in libraries(decoded(read(name))):
+    for statement in libraries(read(name)):
         for library in _library_names(folder, statement):
             files.append(library)
-            for m in parse_mtl(decoded(read_if_there(read, library) or b"")).values():
+            for m in parse_mtl(read_if_there(read, library) or b"").values():
                 files += [_texture_name(folder, t.name) for t in (m.texture, m.opacity_map) if t is not None]
     return tuple(dict.fromkeys(files))
 
@@ -424,7 +405,7 @@ def _looking(part: RawPart, looks: dict[str, str]) -> RawPart:
     finish, keep = corrected(part.finish, look)
     textured = keep and part.image is not None
     clear = finish.color[3] < 0.9 or finish.metallic > 0.5 or finish.mirror
-    cover = kind_of(part.name, look) if textured else cover_of(part.name, finish.color, look, clear)
+    cover = cover_of(part.name, finish.color, look, textured=textured, clear=clear)
     finish = replace(finish, detail=cover and COVERS[cover].detail)
     image, uv = (part.image, part.uv) if textured else (None, None)
     return replace(part, finish=finish, image=image, uv=uv, cover=cover)

@@ -203,34 +203,25 @@ DARK = 0.42
 """sRGB mean below which wood is drawn as walnut."""
 
 
-def kind_of(name: str, look: str) -> str | None:
-    """The cover that a textured material's `look` or its name stands for; None for none."""
-    return None if "plain" in look.split() else _said(look) or _named(name)
-
-
-def cover_of(name: str, color: tuple[float, ...], look: str, clear: bool) -> str | None:
-    """The cover of an untextured material: what its `look` says, or else its name; None for none.
+def cover_of(name: str, color: tuple[float, ...], look: str, *, textured: bool, clear: bool) -> str | None:
+    """The cover of a material: what its `look` says, or else its name; None for none.
 
     Args:
       color: sRGB.
-      clear: it is glass, metal or a mirror.
+      clear: it is glass, metal or a mirror, which wears none but with a texture.
     """
     words = look.split()
-    if clear or "plain" in words:
+    if "plain" in words or (clear and not textured):
         return None
-    matter = _said(look)
-    if matter is None and not set(words) & OTHER:
+    matter = next((w for w in words if w in COVERS), None)
+    if matter is None and (textured or not set(words) & OTHER):
         matter = _named(name)
-    if matter != "wood":
+    if matter != "wood" or textured:
         return matter
     red, green, blue = color[:3]
     if red - blue < WOODEN * max(color[:3]) or not red >= green >= blue:
         return None
     return "dark wood" if sum(color[:3]) / 3 < DARK else "wood"
-
-
-def _said(look: str) -> str | None:
-    return next((w for w in look.split() if w in COVERS), None)
 
 
 def _named(name: str) -> str | None:

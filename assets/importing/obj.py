@@ -109,7 +109,7 @@ class Obj:
     """Parts of its geometry that are not drawn, in words."""
 
 
-def parse_obj(text: str, where: str) -> Obj:
+def parse_obj(data: bytes, where: str) -> Obj:
     """Read an OBJ file; faces of one material are gathered from all its objects.
 
     Raises:
@@ -120,7 +120,7 @@ def parse_obj(text: str, where: str) -> Obj:
     faces: dict[str, list[Polygon]] = {}
     libraries, left_out = [], set()
     current = faces.setdefault("", [])
-    for number, head, rest in _statements(text):
+    for number, head, rest in _statements(data):
         if head == "v":
             vertices.append((number, rest.partition("#")[0]))
         elif head == "vt":
@@ -155,9 +155,9 @@ def parse_obj(text: str, where: str) -> Obj:
     return Obj(points, coords, tuple(groups), tuple(dict.fromkeys(libraries)), colours, tuple(sorted(left_out)))
 
 
-def libraries(text: str) -> tuple[str, ...]:
+def libraries(data: bytes) -> tuple[str, ...]:
     """Texts of the mtllib statements of an OBJ file, without reading its mesh."""
-    return tuple(dict.fromkeys(rest for _, head, rest in _statements(text) if head == "mtllib"))
+    return tuple(dict.fromkeys(rest for _, head, rest in _statements(data) if head == "mtllib"))
 
 
 def decoded(data: bytes) -> str:
@@ -170,9 +170,9 @@ def decoded(data: bytes) -> str:
         return data.decode("latin-1")
 
 
-def _statements(text: str) -> Iterator[tuple[int, str, str]]:
+def _statements(data: bytes) -> Iterator[tuple[int, str, str]]:
     """The number, the first word and the rest of every line; a backslash at its end joins it with the next."""
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    text = decoded(data).replace("\r\n", "\n").replace("\r", "\n")
     number = 1
     for line in re.sub(r"\\[ \t]*\n", JOINED, text).split("\n"):
         head, *rest = line.split(None, 1) or [""]
@@ -180,11 +180,11 @@ def _statements(text: str) -> Iterator[tuple[int, str, str]]:
         number += 1 + line.count(JOINED)
 
 
-def parse_mtl(text: str) -> dict[str, MtlMaterial]:
+def parse_mtl(data: bytes) -> dict[str, MtlMaterial]:
     """The materials of an MTL file by name; statements it does not know are ignored."""
     materials: dict[str, MtlMaterial] = {}
     name = None
-    for _, head, rest in _statements(text):
+    for _, head, rest in _statements(data):
         if head == "newmtl":
             name = rest
             materials[name] = MtlMaterial(name)

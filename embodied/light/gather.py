@@ -198,12 +198,3 @@ def sent_back(
     first = hiding(cloud, position, normal)[2]
     share = area / area.sum()
     return SentBack(cloud, share @ (first * albedo) / np.maximum(1 - share @ albedo, 0.1))
-
-
-def by_carrier(lamps: Mapping[str, Lamp], carriers: Mapping[str, str]) -> dict[str, list[Lamp]]:
-    """Lamps by what carries them."""
-    out: dict[str, list[Lamp]] = {}
-    for name, root in carriers.items():
-        if name in lamps:
-            out.setdefault(root, []).append(lamps[name])
-    return out

@@ -16,18 +16,7 @@ import numpy as np
 from embodied.house.house import House
 from embodied.house.moment import RigidPose
 from embodied.house.shapes import room_at
-from embodied.light.gather import (
-    Blocked,
-    LitRays,
-    SentBack,
-    behind,
-    by_carrier,
-    direct,
-    fitting_of,
-    lamp_at,
-    sent_back,
-    without,
-)
+from embodied.light.gather import Blocked, LitRays, SentBack, behind, direct, fitting_of, lamp_at, sent_back, without
 from embodied.light.movers import DISCS, Placed, Surface, cloud_of, hidden_by, hiding, kernels, shadow_box, unhidden
 from embodied.light.pages.colours import linear
 from embodied.light.pages.files import Bake
@@ -93,7 +82,10 @@ class HousePages:
         self._lamplit: _Hides | None = None
         self._burning: list[tuple[Lamp, Blocked]] = []
         self._sent_back: dict[str, SentBack] = {}
-        self._carried = by_carrier({x.id: x for x in self.lamps}, carriers)
+        baked = {x.id: x for x in self.lamps}
+        self._carried: dict[str, list[Lamp]] = {}
+        for name in (n for n in carriers if n in baked):
+            self._carried.setdefault(carriers[name], []).append(baked[name])
         for root, lamps in self._carried.items():
             self._carried[root] = [*lamps, *(f for x in lamps if (f := self._fitting(x)) is not None)]
 

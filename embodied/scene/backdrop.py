@@ -12,54 +12,14 @@ import numpy as np
 from embodied.assets.cache import digest, write_bytes
 from embodied.assets.closure import code_digest
 from embodied.assets.decoding import read_picture
-from embodied.house.house import House
 from embodied.scene.buildings import EVENING, LIT, PANE, ROOF, WALL, Building, Faces, faces_of
-from embodied.scene.far_canvas import (
-    KNOTS,
-    SNOW,
-    DrawList,
-    FarCanvas,
-    FarLight,
-    elevations,
-    share_down,
-    transmittance,
-    tree,
-)
+from embodied.scene.far_canvas import EYE, SNOW, DrawList, FarCanvas, FarLight, elevations, transmittance, tree
 from embodied.scene.far_land import DRY, paint_ground, paint_water, ridge
 from embodied.scene.landscapes import Ridge, Scenery, Town
 from embodied.seeds import stream
 
-DOME = "outdoor/sky"
-"""Owner of the dome; no instance id belongs to it."""
-DOME_RADIUS = 90.0
-"""Metres to the dome that shows the picture."""
-EYE = 1.6
-"""Above the floor, metres."""
 VARIANTS = 8
 """Of every landscape; houses whose seeds differ by so many share one."""
-
-
-def dome(house: House, rows: int = 24) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A sphere around the house that shows a picture on its inside: vertices (n, 3), faces (m, 3), uv (n, 2) from the
-    top left."""
-    corners = np.array([c for r in house.rooms for c in r.polygon])
-    centre = np.array([*(corners.min(0) + corners.max(0)) / 2, EYE])
-    bands = (KNOTS[1] * rows).round().astype(int)
-    height = np.interp(np.arange(rows + 1), bands, KNOTS[0])
-    elevation, u = np.meshgrid(height, np.linspace(0, 1, 2 * rows + 1), indexing="ij")
-    v, yaw = share_down(elevation), np.pi * (1 - 2 * u)
-    d = np.stack([np.cos(elevation) * np.cos(yaw), np.cos(elevation) * np.sin(yaw), np.sin(elevation)], axis=-1)
-    i = np.arange(rows)[:, None] * (2 * rows + 1) + np.arange(2 * rows)[None]
-    a, b, c, e = i, i + 1, i + 2 * rows + 2, i + 2 * rows + 1
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, e], -1).reshape(-1, 3)])
-    vertices = (centre + DOME_RADIUS * d).reshape(-1, 3)
-    p = vertices[faces]
-    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    outward = (normal * (p.mean(1) - centre)).sum(1) > 0
-    faces = np.where(outward[:, None], faces[:, ::-1], faces)
-    real = np.linalg.norm(normal, axis=1) > 1e-4
-    uv = np.stack([u, v], axis=-1).reshape(-1, 2)
-    return vertices.astype(np.float32), faces[real].astype(np.int32), uv.astype(np.float32)
 
 
 def land_rng(seed: int) -> np.random.Generator:

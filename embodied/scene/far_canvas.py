@@ -11,12 +11,19 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from embodied.house.house import House
 from embodied.scene.landscapes import SEASON_COLOURS, Scenery
 
 KNOTS = (np.radians([90.0, 25.0, -40.0, -90.0]), np.array([0.0, 0.2, 0.86, 1.0]))
 """Elevations, and how far down the picture they are."""
 AIR = np.array([0.85, 1.0, 1.3])
 """How much faster than green light red and blue light fade: hills turn blue."""
+DOME = "outdoor/sky"
+"""Owner of the dome; no instance id belongs to it."""
+DOME_RADIUS = 90.0
+"""Metres to the dome that shows the picture."""
+EYE = 1.6
+"""Above the floor, metres."""
 DrawList = list[tuple[float, Callable[[], None]]]
 """How far something is, metres, and what paints it."""
 
@@ -66,6 +73,29 @@ def elevations(rows: int) -> np.ndarray:
 def share_down(elevation: np.ndarray | float) -> np.ndarray:
     """How far down the picture elevations are, 0 to 1."""
     return np.interp(-np.asarray(elevation), -KNOTS[0], KNOTS[1])
+
+
+def dome(house: House, rows: int = 24) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A sphere around the house that shows a picture on its inside: vertices (n, 3), faces (m, 3), uv (n, 2) from the
+    top left."""
+    corners = np.array([c for r in house.rooms for c in r.polygon])
+    centre = np.array([*(corners.min(0) + corners.max(0)) / 2, EYE])
+    bands = (KNOTS[1] * rows).round().astype(int)
+    height = np.interp(np.arange(rows + 1), bands, KNOTS[0])
+    elevation, u = np.meshgrid(height, np.linspace(0, 1, 2 * rows + 1), indexing="ij")
+    v, yaw = share_down(elevation), np.pi * (1 - 2 * u)
+    d = np.stack([np.cos(elevation) * np.cos(yaw), np.cos(elevation) * np.sin(yaw), np.sin(elevation)], axis=-1)
+    i = np.arange(rows)[:, None] * (2 * rows + 1) + np.arange(2 * rows)[None]
+    a, b, c, e = i, i + 1, i + 2 * rows + 2, i + 2 * rows + 1
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, e], -1).reshape(-1, 3)])
+    vertices = (centre + DOME_RADIUS * d).reshape(-1, 3)
+    p = vertices[faces]
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    outward = (normal * (p.mean(1) - centre)).sum(1) > 0
+    faces = np.where(outward[:, None], faces[:, ::-1], faces)
+    real = np.linalg.norm(normal, axis=1) > 1e-4
+    uv = np.stack([u, v], axis=-1).reshape(-1, 2)
+    return vertices.astype(np.float32), faces[real].astype(np.int32), uv.astype(np.float32)
 
 
 class FarCanvas:

@@ -29,7 +29,7 @@ from embodied.assets.moving_parts import closed
 from embodied.assets.records import Finish, MeshPart
 from embodied.geometry import rotation
 from embodied.house.house import House, Placement
-from embodied.scene import backdrop, collision, cupboards, doors, stairs
+from embodied.scene import backdrop, collision, cupboards, doors, far_canvas, stairs
 from embodied.scene.cupboards import Case
 from embodied.scene.doors import Hung
 from embodied.scene.house_meshes import Part, house_parts, owners
@@ -246,10 +246,10 @@ def _light(spec: mujoco.MjSpec) -> None:
 def _add_sky(spec: mujoco.MjSpec, house: House, cache: Path | None) -> None:
     """The far landscape on a dome, as lit houses have it; behind it a gradient, for who looks from beyond."""
     _add_picture(spec, "landscape", backdrop.kept_picture(scenery_of(house), house.seed, cache))
-    vertices, faces, uv = backdrop.dome(house)
+    vertices, faces, uv = far_canvas.dome(house)
     below = np.tile(np.array([0, 0, -1], np.float32), (len(vertices), 1))  # one normal, so that all of it is lit alike
     _add_mesh(spec, "landscape", vertices, below, uv, faces)
-    _draw(spec.worldbody, f"{backdrop.DOME}#0", "landscape", "landscape", (1, 1, 1, 1))
+    _draw(spec.worldbody, f"{far_canvas.DOME}#0", "landscape", "landscape", (1, 1, 1, 1))
     kind = {"type": mujoco.mjtTexture.mjTEXTURE_SKYBOX, "builtin": mujoco.mjtBuiltin.mjBUILTIN_GRADIENT}
     spec.add_texture(name="sky", **kind, rgb1=[0.50, 0.68, 0.90], rgb2=[0.93, 0.95, 0.97], width=128, height=128)
 

@@ -8,19 +8,7 @@ import numpy as np
 import shapely
 from scipy.spatial import ConvexHull
 
-from embodied.assets.built.primitives import (
-    Shape,
-    bar,
-    box,
-    extruded,
-    flat,
-    joined,
-    part,
-    projected_uv,
-    quads,
-    sheet,
-    tube,
-)
+from embodied.assets.built.primitives import Shape, bar, box, extruded, facets, flat, joined, part, quads, sheet, tube
 from embodied.assets.records import Finish
 from embodied.house.house import House
 from embodied.house.shapes import inward, room_union
@@ -312,11 +300,7 @@ def _fir(height: float, *, rng: np.random.Generator) -> Shape:
             root, spine = at(0, 0, high), at(0.6 * far, 0, high * 0.25 + low * 0.3)
             left, right = at(0.55 * far, -half, low * 0.6), at(0.55 * far, half, low * 0.6)
             shapes += [(root, left, spine), (left, tip, spine), (root, spine, right), (right, spine, tip)]
-    corners = np.array(shapes)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = np.repeat(normals / np.linalg.norm(normals, axis=1, keepdims=True), 3, axis=0)
-    vertices, faces = corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
-    return Shape(vertices, faces, normals, projected_uv(vertices, normals)).two_sided()
+    return facets(shapes).two_sided()
 
 
 def _bare(height: float, *, rng: np.random.Generator) -> Shape:

@@ -19,7 +19,8 @@ from embodied.light.pages.unwrap import SPARSEST, areas_of
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.radiosity import LIFT, Together, points_of, small_sky
 from embodied.light.tracing.sky import Outdoors
-from embodied.scene.backdrop import DOME, GLOW, dome
+from embodied.scene.backdrop import GLOW
+from embodied.scene.far_canvas import DOME, dome
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 

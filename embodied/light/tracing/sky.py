@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 
 from embodied.house.house import House, Sky
-from embodied.scene.backdrop import EYE, land_rng, paint_land
-from embodied.scene.far_canvas import FarCanvas, FarLight, elevations, share_down
+from embodied.scene.backdrop import land_rng, paint_land
+from embodied.scene.far_canvas import EYE, FarCanvas, FarLight, elevations, share_down
 from embodied.scene.landscapes import Scenery, scenery_of
 from embodied.seeds import stream
 
