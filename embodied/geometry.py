@@ -21,7 +21,7 @@ def heading_of_yaw(yaw: Angles) -> Angles:
 
 def yaw_of_heading(heading: Angles) -> Angles:
     """Yaw (ccw from +x, in [-pi, pi)) of a Matterport heading (clockwise from +y)."""
-    return cast(Angles, wrap(np.pi / 2 - np.asarray(heading)))
+    return wrap(np.pi / 2 - heading)
 
 
 def r2(k: Any) -> tuple[Any, Any]:

@@ -134,7 +134,8 @@ def outline(x0: float, x1: float, z0: float, z1: float, y: float) -> list[tuple[
 
 def border(x0: float, x1: float, z0: float, z1: float, outer: tuple[float, float], inner: tuple[float, float]) -> Shape:
     """A strip around an upright rectangle; its edges lie so far inside the rectangle, at a y."""
-    return between(*(outline(x0 + by, x1 - by, z0 + by, z1 - by, y) for by, y in (outer, inner)))
+    low, high = (outline(x0 + by, x1 - by, z0 + by, z1 - by, y) for by, y in (outer, inner))
+    return between(low, high)
 
 
 def upright(x0: float, x1: float, z0: float, z1: float, y: float) -> Shape:
