@@ -10,13 +10,11 @@ Entity tree (timeline 'step'):
   plot/...               distance to the goal, requests, HARI's cost, probabilities     events   a log
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import rerun as rr
@@ -84,7 +82,7 @@ class Views:
     recognise: Recognise | None = None
     """Names what the agent's encoder recognises."""
 
-    def with_closed(self, node: int, closed: frozenset[str]) -> Views:
+    def with_closed(self, node: int, closed: frozenset[str]) -> Self:
         """The same from a node while some doors are closed."""
         name = seen_name(self.seen.house, self.seen.graph, node, closed)
         return dataclasses.replace(self, seen=place_named({self.seen.name: self.seen}, name))

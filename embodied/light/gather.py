@@ -4,12 +4,10 @@ lamps that are carried through it: their own, past all that stands in its way, a
 Source: final gathering: M. Reichert, A two-pass radiosity method driven by lights and viewer position (1992).
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Self, TypeAlias
 
 import numpy as np
 
@@ -43,11 +41,11 @@ class LitRays:
     sky: np.ndarray
     """(h, 2h, 3) as Outdoors.picture: what is met by rays that leave the house."""
 
-    @staticmethod
-    def among(first: Rays, meshes: Sequence[LitMesh], radiance: Mapping[int, np.ndarray], sky: np.ndarray) -> LitRays:
+    @classmethod
+    def among(cls, first: Rays, meshes: Sequence[LitMesh], radiance: Mapping[int, np.ndarray], sky: np.ndarray) -> Self:
         """Those among the faces of meshes, in order."""
         page = np.repeat([m.page for m in meshes], [len(m.faces) for m in meshes])
-        return LitRays(first, page, np.concatenate([m.uv[m.faces] for m in meshes]), radiance, sky)
+        return cls(first, page, np.concatenate([m.uv[m.faces] for m in meshes]), radiance, sky)
 
     def along(self, start: np.ndarray, ahead: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Radiance (n, 3) met by rays, and how far away, (n,) metres; infinite for the sky."""

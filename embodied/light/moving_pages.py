@@ -4,8 +4,6 @@ Pages near where a thing was get the light back that it hid, pages near where it
 The sun is asked for by rays, and so is the light of lamps that are carried.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -57,6 +55,25 @@ class Patch:
     column: int
     picture: np.ndarray
     """(h, w, 3) uint8."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Hides:
+    """Light that things which belong together hide where they are."""
+
+    things: tuple[Placed, ...]
+    tiles: Mapping[Tile, np.ndarray]
+    """(HALF_TILE, HALF_TILE, 4) float32: the share of its light that every second luxel gets past the thing, and the
+    light that the thing sends it."""
+    direct: frozenset[Tile]
+    """Tiles from which they may hide the sun, or which a carried lamp lights."""
+
+    def holds(self, things: Sequence[Placed], slack: float) -> bool:
+        """True for the same things in about the same places."""
+        return len(things) == len(self.things) and all(
+            new.surface is old.surface and new.pose.apart(old.pose) <= slack
+            for new, old in zip(things, self.things, strict=True)
+        )
 
 
 class HousePages:
@@ -535,25 +552,6 @@ def _paint(
 
 
 LINEAR = linear(np.arange(256, dtype=np.float32) / 255)
-
-
-@dataclass(frozen=True, eq=False)
-class _Hides:
-    """Light that things which belong together hide where they are."""
-
-    things: tuple[Placed, ...]
-    tiles: Mapping[Tile, np.ndarray]
-    """(HALF_TILE, HALF_TILE, 4) float32: the share of its light that every second luxel gets past the thing, and the
-    light that the thing sends it."""
-    direct: frozenset[Tile]
-    """Tiles from which they may hide the sun, or which a carried lamp lights."""
-
-    def holds(self, things: Sequence[Placed], slack: float) -> bool:
-        """True for the same things in about the same places."""
-        return len(things) == len(self.things) and all(
-            new.surface is old.surface and new.pose.apart(old.pose) <= slack
-            for new, old in zip(things, self.things, strict=True)
-        )
 
 
 def _together(tiles: Sequence[np.ndarray]) -> np.ndarray:

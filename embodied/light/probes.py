@@ -6,8 +6,6 @@ harmonics for each colour, without the direct sun. Every room has a grid of its 
 Source: Ramamoorthi and Hanrahan, An efficient representation for irradiance environment maps (2001).
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -79,6 +77,24 @@ def turned(coefficients: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     A body of pose `rotation` sees a room's light in its own frame turned by `rotation.T`.
     """
     return (FROM_NORMALS @ harmonics(NORMALS @ np.asarray(rotation, float))) @ coefficients
+
+
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """Numbers that `Probes.at` needs of a room's grid."""
+
+    origin: np.ndarray
+    step: np.ndarray
+    last: np.ndarray
+    """(3,) float, place of the highest corner, in steps."""
+    lowest: np.ndarray
+    """(3,) int, highest place of a cell's lowest corner."""
+    strides: np.ndarray
+    """(3,) int, between neighbours' numbers."""
+    corners: np.ndarray
+    """(8,) int, numbers of the first cell's corners."""
+    nearest: Callable[[np.ndarray], np.ndarray]
+    """From points (m, 3) to numbers (m,) of the nearest valid probes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,21 +181,3 @@ class Probes:
             first + CORNERS @ strides,
             lambda points: here[tree.query(points)[1]],
         )
-
-
-@dataclass(frozen=True, eq=False)
-class _Grid:
-    """Numbers that `Probes.at` needs of a room's grid."""
-
-    origin: np.ndarray
-    step: np.ndarray
-    last: np.ndarray
-    """(3,) float, place of the highest corner, in steps."""
-    lowest: np.ndarray
-    """(3,) int, highest place of a cell's lowest corner."""
-    strides: np.ndarray
-    """(3,) int, between neighbours' numbers."""
-    corners: np.ndarray
-    """(8,) int, numbers of the first cell's corners."""
-    nearest: Callable[[np.ndarray], np.ndarray]
-    """From points (m, 3) to numbers (m,) of the nearest valid probes."""

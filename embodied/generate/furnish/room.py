@@ -12,7 +12,7 @@ from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.groups import put_group, sides
 from embodied.generate.furnish.kitchen import kitchen_line
 from embodied.generate.furnish.mounting import Hanging, along_stretches, hang_first, hang_from_ceiling
-from embodied.generate.furnish.tables import FurnitureGroup, GroupPart, PlacementRule, RuleCondition
+from embodied.generate.furnish.tables import FurnitureGroup, GroupPart, PlacementRule
 
 
 def furnish_room(ctx: Context) -> None:
@@ -43,7 +43,7 @@ def apply_rule(rule: PlacementRule, ctx: Context) -> bool:
     return has_place
 
 
-def _is_tried(rule: RuleCondition, ctx: Context) -> bool:
+def _is_tried(rule: PlacementRule, ctx: Context) -> bool:
     return (
         rule.above < ctx.space.area <= rule.upto
         and rule.from_attempt <= ctx.attempt <= rule.upto_attempt

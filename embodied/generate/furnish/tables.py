@@ -30,9 +30,10 @@ PER = ("room", "carrier", "person", "adult", "child", "young")
 
 
 @dataclass(frozen=True)
-class PartModel:
-    """The thing itself. Tuples of numbers have a value for each round, the last one for all that follow."""
+class GroupPart:
+    """One kind of thing in a group. Tuples of numbers have a value for each round, the last one for all that follow."""
 
+    # the thing itself
     role: str
     """A role, or a class of object; empty where the rule says it."""
     name: str = ""
@@ -54,15 +55,7 @@ class PartModel:
     same: float = 0.0
     """Chance that it is the model of the last thing of its name in the room."""
 
-    @property
-    def called(self) -> str:
-        return self.name or self.role
-
-
-@dataclass(frozen=True)
-class PartSize:
-    """Its size, if that is not its model's own."""
-
+    # its size, if that is not its model's own
     width: float | None = None
     """Its width, whatever its model's; so are `depth` and `height`."""
     depth: float | None = None
@@ -75,11 +68,7 @@ class PartSize:
     long: bool = False
     """Its longer side is its width, however its model is turned."""
 
-
-@dataclass(frozen=True)
-class PartPose:
-    """Its place in the group, and its turn."""
-
+    # its place in the group, and its turn
     at: str = "wall"
     """Its place: the first part to the "wall"; others "on", "under", "before", "beside" or "over" (above it, at
     the wall) the part `of`, "about" on its area, "facing" it from across the room, on "seats" around it, or in a
@@ -111,11 +100,7 @@ class PartPose:
     look: bool = False
     """Its front looks at `of`."""
 
-
-@dataclass(frozen=True)
-class PartPresence:
-    """Conditions under which it is there, and how often."""
-
+    # conditions under which it is there, and how often
     optional: bool = False
     """It is left out where it does not fit, instead of giving the group up."""
     must: tuple[int, ...] = ()
@@ -136,11 +121,7 @@ class PartPresence:
     lower_than: float = 99.0
     """Only if the upper edge of `of` is lower, metres."""
 
-
-@dataclass(frozen=True)
-class PartClearance:
-    """Free space around it."""
-
+    # free space around it
     clear: tuple[float, ...] = ()
     """Depth before its front that nothing may fill but what is `under` it, metres; negative: behind its back. From 0.5
     m on, somebody must be able to stand there."""
@@ -151,14 +132,13 @@ class PartClearance:
     passage: bool = False
     """It may lie in doorways (mats and rugs)."""
 
-
-@dataclass(frozen=True)
-class GroupPart(PartClearance, PartPresence, PartPose, PartSize, PartModel):
-    """One kind of thing in a group; groups.toml gives the fields of all five records side by side."""
-
     def __post_init__(self) -> None:
         _one_of("at", self.at, AT)
         _one_of("side", self.side, ("right", "left", "both"))
+
+    @property
+    def called(self) -> str:
+        return self.name or self.role
 
 
 @dataclass(frozen=True)
@@ -208,9 +188,10 @@ class FurnitureGroup:
 
 
 @dataclass(frozen=True)
-class RuleCondition:
-    """Conditions under which a rule is tried."""
+class PlacementRule:
+    """One line of what a room gets: a group or choice of that name, or several rules, under conditions."""
 
+    # conditions under which it is tried
     chance: float = 1.0
     """Probability that it is tried, where all that follows allows it."""
     above: float = 0.0
@@ -234,11 +215,7 @@ class RuleCondition:
     """Only if the room has been tried so often without success."""
     upto_attempt: int = 99
 
-
-@dataclass(frozen=True)
-class PlacementRule(RuleCondition):
-    """One line of what a room gets: a group or choice of that name, or several rules, under conditions."""
-
+    # what it gets
     group: str = ""
     role: str = ""
     """Role of the first part."""

@@ -1,7 +1,5 @@
 """A finished bake as a world that camera rays can be traced in; what glossy and reference pictures share."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2
@@ -19,6 +17,28 @@ from embodied.light.tracing.radiosity import Space
 from embodied.light.tracing.sky import Outdoors, outdoors
 from embodied.scene.far_canvas import KNOTS
 from embodied.scene.lit_pages import LitPages, glass_surfaces
+
+
+@dataclass(frozen=True, eq=False)
+class Panes:
+    """See-through things, drawn over what lies behind them as the classic renderer does; k faces."""
+
+    scene: RayScene
+    normal: Array
+    """(k * 3)."""
+    uv: Array
+    """(k * 3 * 2)."""
+    opacity: Array
+    """(k,)."""
+    surfaces: Array
+    """(k,) of glass that stand behind one another; 0 where it is none."""
+    owner: np.ndarray
+    """(k,) int32 instance ids."""
+    page: Array
+    """(k,), then of all pages: size (pages * 2), first texel, and sRGB pictures as shown."""
+    size: Array
+    base: Array
+    picture: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,28 +74,6 @@ class BakedScene:
     outdoors: Outdoors
     panes: Panes | None
     """See-through faces: glass and sheer curtains."""
-
-
-@dataclass(frozen=True, eq=False)
-class Panes:
-    """See-through things, drawn over what lies behind them as the classic renderer does; k faces."""
-
-    scene: RayScene
-    normal: Array
-    """(k * 3)."""
-    uv: Array
-    """(k * 3 * 2)."""
-    opacity: Array
-    """(k,)."""
-    surfaces: Array
-    """(k,) of glass that stand behind one another; 0 where it is none."""
-    owner: np.ndarray
-    """(k,) int32 instance ids."""
-    page: Array
-    """(k,), then of all pages: size (pages * 2), first texel, and sRGB pictures as shown."""
-    size: Array
-    base: Array
-    picture: Array
 
 
 @dataclass(frozen=True, eq=False)
