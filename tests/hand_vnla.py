@@ -13,7 +13,7 @@ from embodied.agents.vnla.study import VnlaAbout, VnlaAgent
 from embodied.kinds.shipped.vnla import VNLA
 from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage
-from embodied.tasks.vnla import vnla_pool, vnla_task
+from embodied.tasks.goals import vnla_pool, vnla_task
 from embodied.teachers.vnla import VnlaTeacher
 
 TINY = VnlaSettings(

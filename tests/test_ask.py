@@ -14,10 +14,10 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from hand_worlds import grid_world
 
-from embodied.agents.ask.config import AskerConfig, AskEvaluation
 from embodied.agents.ask.learned import CHOICES, Foresight, LearnedAsker, facts, fit
 from embodied.agents.ask.study import AskStudy
 from embodied.agents.language_models.agent import QUESTION_WORDS
+from embodied.agents.learners.ask import AskerConfig, AskEvaluation
 from embodied.agents.studies.engine import run_study
 from embodied.assistants.ask import in_view
 from embodied.cli import main as start

@@ -16,8 +16,8 @@ import pytest
 from tqdm import tqdm
 
 from embodied import cli
-from embodied.agents.hanna.training_config import TrainingConfig
 from embodied.agents.learners.bandit import BanditConfig
+from embodied.agents.learners.hanna import TrainingConfig
 from embodied.agents.learners.hari import ExecutionConfig, IntentionConfig
 from embodied.agents.vision.config import VisionConfig
 from embodied.assets.materials import finish

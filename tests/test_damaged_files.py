@@ -36,10 +36,10 @@ from embodied.agents.common.session import Session
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.common.weights import WEIGHTS_FORMAT, load_weights, restore, save_tensors
 from embodied.agents.hanna.agent import HannaAbout, HannaAgent
-from embodied.agents.hanna.training_config import HANNA_SCALES
 from embodied.agents.hari import networks as hari
 from embodied.agents.iliad.nav.run import load_follower
 from embodied.agents.iliad.regex.run import load_student
+from embodied.agents.learners.hanna import HANNA_SCALES
 from embodied.agents.vision.config import PLAIN
 from embodied.agents.vision.features import HouseStrips, load_features, save_features
 from embodied.assets.closure import ROOT

@@ -43,7 +43,7 @@ from embodied.agents.hanna.agent import (
     reason_loss,
 )
 from embodied.agents.hanna.policy import for_training
-from embodied.agents.hanna.training_config import EVALUATIONS, HANNA_SCALES, RULES, TrainingConfig, ask_above
+from embodied.agents.learners.hanna import EVALUATIONS, HANNA_SCALES, RULES, TrainingConfig, ask_above
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import Split
 from embodied.assistants.anna import Anna

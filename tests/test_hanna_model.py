@@ -25,7 +25,7 @@ from embodied.agents.hanna.attention import (
     target_similarity,
 )
 from embodied.agents.hanna.network import HannaNetwork
-from embodied.agents.hanna.training_config import TrainingConfig
+from embodied.agents.learners.hanna import TrainingConfig
 
 WORDS, FEATURES = 12, 6
 SMALL = TrainingConfig(hidden_size=16, navigation_embedding=8, ask_embedding=4, self_heads=2, text_heads=2, dropout=0.0)

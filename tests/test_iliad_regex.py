@@ -12,8 +12,15 @@ from hypothesis import strategies as st
 
 from embodied.agents.common.tensors import greedy_choice
 from embodied.agents.common.weights import CheckpointError
-from embodied.agents.iliad.regex.data import LEAST_CHANGED, WordTask, made_up, make_data, rules_without_requests
-from embodied.agents.iliad.regex.language import PARTS, templates
+from embodied.agents.iliad.regex.data import (
+    LEAST_CHANGED,
+    PARTS,
+    WordTask,
+    made_up,
+    make_data,
+    rules_without_requests,
+    templates,
+)
 from embodied.agents.iliad.regex.rules import (
     ALPHABET,
     LETTERS,

@@ -8,8 +8,8 @@ import math
 import pytest
 
 from embodied.agents.common.settings import RunSettings, ValidatedRunSettings
-from embodied.agents.hanna.training_config import TrainingConfig
 from embodied.agents.learners.bandit import BanditConfig
+from embodied.agents.learners.hanna import TrainingConfig
 from embodied.agents.learners.hari import ExecutionConfig, IntentionConfig
 from embodied.agents.learners.vnla import VnlaSettings
 from embodied.agents.vision.config import VisionConfig

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from embodied.agents.hanna.topological_map import PlaceMap, Trail, matches, opposite, weigh_by_image
-from embodied.agents.hanna.training_config import ask_patiently
+from embodied.agents.learners.hanna import ask_patiently
 from embodied.interface import Ask, Candidates, Intention, Mode, Move, Observation, Sight
 
 LOOKS = np.random.default_rng(0).normal(size=(12, 36, 24)).astype(np.float32)

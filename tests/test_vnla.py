@@ -20,7 +20,7 @@ from embodied.kinds.shipped.vnla import VNLA
 from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage, heard_subgoal
 from embodied.policies.baselines import Shortest, SubgoalListener, VnlaAsking
-from embodied.tasks.vnla import MOST_ACTIONS, time_limits, vnla_pool, vnla_task
+from embodied.tasks.goals import MOST_ACTIONS, time_limits, vnla_pool, vnla_task
 from embodied.teachers.vnla import VnlaTeacher, ask_reason
 
 TASK = Task(

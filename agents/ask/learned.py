@@ -21,8 +21,8 @@ import numpy as np
 import torch
 from torch import nn
 
-from embodied.agents.ask.config import AskerConfig
 from embodied.agents.common.weights import load_weights, seeded
+from embodied.agents.learners.ask import AskerConfig
 from embodied.assistants.ask import CONFIRM_DISTANCE, QUESTIONS, in_view
 from embodied.envs.ask import AskEnv
 from embodied.envs.base import HelpEnv

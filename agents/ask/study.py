@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from embodied.agents.ask.config import AskerConfig, AskEvaluation
 from embodied.agents.ask.learned import Decisions, Foresight, LearnedAsker, load_asker, shown, train
 from embodied.agents.common.session import Note
 from embodied.agents.common.weights import save_weights
+from embodied.agents.learners.ask import AskerConfig, AskEvaluation
 from embodied.agents.studies.engine import Measured, StudyLearner
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
 from embodied.assets.catalogue import load_catalogue

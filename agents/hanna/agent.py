@@ -39,7 +39,7 @@ from embodied.agents.hanna.lstm import LstmNetwork
 from embodied.agents.hanna.network import AgentNetwork, HannaNetwork, Scores
 from embodied.agents.hanna.policy import HannaMemory, HannaPolicy, StepScores, for_training
 from embodied.agents.hanna.topological_map import MapPolicy, PerfectInterpretation
-from embodied.agents.hanna.training_config import RULES, HannaEvaluation, TrainingConfig, ask_patiently
+from embodied.agents.learners.hanna import RULES, HannaEvaluation, TrainingConfig, ask_patiently
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import SightedLearner, Split
 from embodied.datasets.store import Dataset

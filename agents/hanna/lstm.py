@@ -14,7 +14,7 @@ from torch import Tensor, nn
 from embodied.agents.common.tensors import Rows
 from embodied.agents.hanna.attention import SLOTS, VIEWS, DotAttend, Percept, action_size
 from embodied.agents.hanna.network import AgentNetwork
-from embodied.agents.hanna.training_config import TrainingConfig
+from embodied.agents.learners.hanna import TrainingConfig
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,7 +38,7 @@ from embodied.agents.hanna.attention import (
     slot_distribution,
     target_similarity,
 )
-from embodied.agents.hanna.training_config import TrainingConfig
+from embodied.agents.learners.hanna import TrainingConfig
 
 SHORT = 12
 """Words up to which an instruction is encoded with the short ones."""

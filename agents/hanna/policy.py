@@ -16,7 +16,7 @@ from embodied.agents.common.tensors import Chooser, RunningRows, choose_greedily
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.hanna import attention
 from embodied.agents.hanna.network import AgentNetwork, Scores
-from embodied.agents.hanna.training_config import RULES, HannaAskRule, ask_greedily, ask_sampled
+from embodied.agents.learners.hanna import RULES, HannaAskRule, ask_greedily, ask_sampled
 from embodied.agents.vision.features import FeatureBank
 
 StepScores = tuple[tuple[int, ...], Scores]

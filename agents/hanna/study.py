@@ -10,7 +10,7 @@ from typing import Any
 
 from embodied.agents.common.session import Note
 from embodied.agents.hanna.agent import HannaAgent, HannaLearner, by_the_text, hanna_policies
-from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
+from embodied.agents.learners.hanna import HannaEvaluation, TrainingConfig
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
 from embodied.agents.vision.sighted_study import TEST_SPLITS as TEST

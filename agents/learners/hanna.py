@@ -1,19 +1,161 @@
-"""HANNA: agents that ask people for help and follow their routes."""
+"""HANNA: agents that ask people for help and follow their routes: the hyperparameters of dissertation Table D.1 and the
+ablations of D.2, in one record; who decides when to ask, the learned network, or one of the heuristics of 4.2.5; and
+commands.
+
+Three rows of Table D.1 belong to the world and live there: gamma = 0.25 with the teacher
+(embodied.teachers.shortest), the attention radius with the assistant (embodied.assistants.anna), the
+success radius with the task (embodied.kinds.shipped.hanna).
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Protocol
+
+import numpy as np
 
 from embodied.agents import options
+from embodied.agents.common import settings
 from embodied.agents.common.settings import SHIPPED_AGENT
-from embodied.agents.hanna.training_config import EVALUATIONS, HANNA_SCALES, HannaEvaluation, TrainingConfig
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
-from embodied.options import Count, Settings
+from embodied.interface import Mode, Observation
+from embodied.options import Count, Option, Settings
+from embodied.policies import baselines
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset
+
+
+class HannaAskRule(Protocol):
+    def __call__(
+        self, probability: float, observation: Observation, last_asked: int, *, rng: np.random.Generator
+    ) -> bool:
+        """True to ask now, at a place where it is possible.
+
+        Args:
+          probability: of REQUEST according to the help-request network.
+          observation: what the agent sees.
+          last_asked: time of the last request, -1 before any.
+        """
+
+
+def ask_sampled(probability: float, observation: Observation, last_asked: int, *, rng: np.random.Generator) -> bool:
+    """Ask with the probability that the network gives: for training."""
+    return bool(rng.random() < probability)
+
+
+def ask_above(threshold: float) -> HannaAskRule:
+    """Ask where the network's probability exceeds `threshold`: for evaluation."""
+    return lambda probability, observation, last_asked, *, rng: probability > threshold
+
+
+def ask_patiently(threshold: float, *, first: float, on_route: float, patience: int) -> HannaAskRule:
+    """As `ask_above`, but above `first` while nobody has shown where to go, above `on_route` while following one
+    person's route, from which the next person may send elsewhere, and, once a route is left, not before `patience`
+    moves towards what was shown: who asks again at once is sent back to where it came from."""
+
+    def rule(probability: float, observation: Observation, last_asked: int, *, rng: np.random.Generator) -> bool:
+        if observation.target is None:
+            return probability > first
+        if observation.mode is Mode.SUB:
+            return probability > on_route
+        return probability > threshold and observation.time_on_task >= patience
+
+    return rule
+
+
+ask_greedily = ask_above(0.5)
+"""Ask where the network finds it more likely than not."""
+
+
+def heuristic(rule: baselines.AskRule) -> HannaAskRule:
+    """A rule that does not listen to the network."""
+    return lambda probability, observation, last_asked, *, rng: rule(observation, last_asked, rng=rng)
+
+
+RULES: dict[str, tuple[HannaAskRule, HannaAskRule]] = {
+    "learned": (ask_sampled, ask_greedily),
+    "never": (heuristic(baselines.never_ask),) * 2,
+    "random": (heuristic(baselines.ask_at_random),) * 2,
+    "every5": (heuristic(baselines.ask_every_5),) * 2,
+}
+"""Name of a help-request policy -> its rule in training and its rule in evaluation."""
+
+
+MODELS = ("hanna", "lstm")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingConfig(settings.ImitationSettings):
+    """The defaults are Table D.1; HANNA_SCALES holds the smaller settings."""
+
+    model: Annotated[str, Option(words=MODELS)] = "hanna"
+    """'hanna' (appendix D.2) or 'lstm' (the encoder-decoder of Table 4.6)."""
+    hidden_size: settings.AtLeastOne = 256
+    """Width of both networks."""
+    navigation_embedding: settings.AtLeastOne = 256
+    """Width of an embedded navigation action."""
+    ask_embedding: settings.AtLeastOne = 128
+    """Width of an embedded decision to ask."""
+    self_heads: settings.AtLeastOne = 8
+    """Number of self-attention heads."""
+    text_heads: settings.AtLeastOne = 8
+    """Number of instruction-attention heads."""
+    dropout: settings.NotAll = 0.3
+    """Dropout rate in training."""
+    iterations: settings.AtLeastOne = 30_000
+    """Updates of the weights."""
+    training_steps: settings.AtLeastOne = 20
+    """Horizon of training episodes."""
+    alpha: settings.NotNegative = 1.0
+    """Weight of the curiosity-encouraging loss; 0: ablation. The authors use 0.5 with ask rules other than
+    'learned'."""
+    curiosity_floor: settings.NotAll = 0.0
+    """Mistakes with a lower probability than this add nothing to the curiosity loss; 0: Eq 4.13 (docs/sources.md,
+    S34)."""
+    ask_rule: Annotated[str, Option(words=tuple(sorted(RULES)))] = "learned"
+    """Who decides when to ask: 'learned', 'never', 'random' or 'every5'."""
+    guided_asking: settings.Share = 0.0
+    """Share of training episodes in which 'every5' asks instead of the learned rule, so that early mistakes in asking
+    do not spoil the routes to learn from (docs/sources.md, S33)."""
+    read_assistance: bool = True
+    """Read the words of routes; False: show only the goal image (Table 4.4)."""
+    reset_inter_task: bool = True
+    """Reset the inter-task module between sub-tasks; False: ablation of Table D.2."""
+    predict_reasons: bool = True
+    """Predict the reasons for asking, too; False: ablation of Table D.2."""
+    similarity_attention: bool = True
+    """Attend by cosine similarity; False: ablation of Table D.2 (beta = 0)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HannaEvaluation(settings.EvaluationSettings):
+    """How a HANNA agent is evaluated."""
+
+    evaluation_steps: settings.AtLeastOne = 50
+    """Longest episode in evaluation, steps."""
+    revisit_weight: settings.Share = 1.0
+    """In evaluation, multiply the probability of a move by this for each earlier visit to its target under the same
+    instruction; 1: no effect (docs/sources.md, S36)."""
+    use_goal_image: bool = False
+    """In evaluation with a goal image, stop only at the place that it shows, and take the shortest path there if it is
+    on the topological map (docs/sources.md, S161)."""
+    frontier_discount: settings.Share = 0.0
+    """In evaluation with a goal image, multiply the value of an untried move by this for each step back to it; 0: no
+    exploration."""
+    first_ask_threshold: settings.Share = 0.5
+    """In evaluation, `ask_threshold` before the first goal image (docs/sources.md, S162)."""
+    route_ask_threshold: settings.Share = 0.5
+    """In evaluation, `ask_threshold` on a route (docs/sources.md, S162)."""
+    min_moves_between_requests: settings.Whole = 0
+    """In evaluation, moves after leaving a route before the learned rule asks again."""
+
+
+HANNA_SCALES = settings.scales(TrainingConfig, "hanna")
+"""'mini': minutes on two cores; 'paper': Table D.1, for one GPU (docs/sources.md, S31)."""
+EVALUATIONS = settings.scales(HannaEvaluation, "hanna-evaluation")
+"""How agents of each scale are judged."""
 
 
 @dataclass(frozen=True, kw_only=True)

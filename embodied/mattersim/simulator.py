@@ -14,9 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from embodied.mattersim.graphs import Graphs, listed_scans, load_graphs
+from embodied.mattersim.graphs import (
+    DiscreteViews,
+    Graphs,
+    NavigableLocations,
+    ViewPoint,
+    listed_scans,
+    load_graphs,
+    lookout,
+)
 from embodied.mattersim.pictures import Skyboxes
-from embodied.mattersim.sight import DiscreteViews, NavigableLocations, ViewPoint, lookout
 from embodied.seeds import stream
 
 Draw = Callable[[str, str, float, float, float, tuple[int, int]], np.ndarray]

@@ -13,7 +13,7 @@ from embodied.kinds.shipped.hanna import TABLE_4_2
 from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import NavGraph
 from embodied.policies.baselines import RandomWalk, Shortest, SubgoalListener, VnlaAsking
-from embodied.tasks.vnla import MOST_ACTIONS, help_budget, limit_key, time_limits, vnla_pool, vnla_task
+from embodied.tasks.goals import MOST_ACTIONS, help_budget, limit_key, time_limits, vnla_pool, vnla_task
 from embodied.teachers.vnla import VnlaTeacher
 
 AS_PUBLISHED = "indirect"
