@@ -33,8 +33,17 @@ from embodied.records import load_lines, parse, to_json
 from embodied.serve.app import app_of
 from embodied.serve.driving import ACTIONS
 from embodied.serve.game import Game, set_table
-from embodied.serve.people_data import rated_by_people, worded_by_people, write_people_dataset
-from embodied.serve.results import JUDGEMENTS, Judgement, ResultsWriter, agreement, part_summary, summary
+from embodied.serve.results import (
+    JUDGEMENTS,
+    Judgement,
+    ResultsWriter,
+    agreement,
+    part_summary,
+    rated_by_people,
+    summary,
+    worded_by_people,
+    write_people_dataset,
+)
 from embodied.serve.run import open_study
 from embodied.serve.screens import screen_of
 from embodied.serve.sessions import Sessions

@@ -9,14 +9,21 @@ import pytest
 from hand_worlds import grid_world, line_world
 
 from embodied.action_spaces import WORDS, MonocularMoves
-from embodied.assistants.advisor import Advisor
 from embodied.envs.base import ActionError
-from embodied.envs.vnla import RULES_OF_PLAY, Algorithm6Env, DirectVnlaEnv, MuteDirectVnlaEnv, VnlaEnv, fitted
 from embodied.evaluation.evaluate import play
 from embodied.interface import Ask, FindObject, Mode, Move, Pose, Stop, Task, Thought
 from embodied.kinds import metrics
 from embodied.kinds.shipped.find import FIND
-from embodied.kinds.shipped.vnla import VNLA
+from embodied.kinds.shipped.vnla import (
+    RULES_OF_PLAY,
+    VNLA,
+    Advisor,
+    Algorithm6Env,
+    DirectVnlaEnv,
+    MuteDirectVnlaEnv,
+    VnlaEnv,
+    fitted,
+)
 from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage, heard_subgoal
 from embodied.policies.baselines import Shortest, SubgoalListener, VnlaAsking

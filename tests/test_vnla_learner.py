@@ -32,9 +32,9 @@ from embodied.agents.vnla.network import (
 from embodied.agents.vnla.policy import VnlaMoment, _decided, carried_out, for_training
 from embodied.agents.vnla.study import ASKED, LEARNED, TEACHER, VnlaAgent, VnlaLearner, losses_of
 from embodied.assets.records import ROOM_KINDS
-from embodied.envs.vnla import RULES_OF_PLAY
 from embodied.evaluation.evaluate import play
 from embodied.interface import Ask
+from embodied.kinds.shipped.vnla import RULES_OF_PLAY
 from embodied.records import identity_of
 from embodied.teachers.vnla import VnlaTeacher, ask_reason
 

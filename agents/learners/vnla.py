@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 from embodied.agents import options
 from embodied.agents.common import settings
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
+from embodied.kinds.shipped.vnla import RULES_OF_PLAY
 from embodied.options import Count, Option, Settings
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset
-
-RULES = ("indirect", "direct", "direct-mute", "algorithm-6")
-"""Rules of play (embodied.envs.vnla)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +41,7 @@ class VnlaSettings(settings.ImitationSettings):
     """Episodes per update."""
     blind: bool = False
     """Ablation without vision: all features are zero."""
-    rules: Annotated[str, Option(words=RULES)] = "indirect"
+    rules: Annotated[str, Option(words=tuple(RULES_OF_PLAY))] = "indirect"
     """Rule of play in evaluation. An agent of 'indirect' is trained under 'direct': the advisor's actions replace the
     learner's while what it said is in force, as in the program (docs/sources.md, S112)."""
     validate_every: settings.AtLeastOne = 1000

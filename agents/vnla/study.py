@@ -34,10 +34,9 @@ from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import SightedLearner, SightedStudy, Split, TrainingData
 from embodied.agents.vnla.network import VnlaNetwork, lessons_of, reading_loss
 from embodied.agents.vnla.policy import VnlaMoment, VnlaPolicy, for_training
-from embodied.assistants.advisor import HELP_STEPS
 from embodied.datasets.store import Dataset, SplitData
 from embodied.interface import Agent, Episode
-from embodied.kinds.shipped.vnla import VNLA
+from embodied.kinds.shipped.vnla import HELP_STEPS, VNLA
 from embodied.language.plain_language import PlainLanguage
 from embodied.seeds import stream
 from embodied.teachers.vnla import VnlaTeacher

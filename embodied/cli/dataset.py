@@ -83,7 +83,7 @@ def from_people(args: DatasetOptions) -> None:
     from embodied.agents.bandit.ratings import fitted
     from embodied.assets.cache import write_json
     from embodied.datasets.store import Dataset
-    from embodied.serve.people_data import rated_by_people, worded_by_people, write_people_dataset
+    from embodied.serve.results import rated_by_people, worded_by_people, write_people_dataset
     from embodied.serve.sessions import STARS
 
     if args.people is None or args.data is None:

@@ -59,8 +59,9 @@ class PlaygroundSettings:
     observations: str | Sequence[str] = ("oracle",)
     """Some of embodied.gym.sensors.OBSERVATIONS: 'rgb', 'depth', 'ids', 'features', 'oracle'."""
     rules: Any = None
-    """Rules of play, of the type of TaskKind.rules; the usual ones if None. VNLA: one of embodied.envs.vnla.RULES.
-    HARI: HariRules (costs, stack, sub-goals' length, horizon, a willing assistant). Ask: AskSettings."""
+    """Rules of play, of the type of TaskKind.rules; the usual ones if None. VNLA: one of
+    embodied.kinds.shipped.vnla.RULES_OF_PLAY. HARI: HariRules (costs, stack, sub-goals' length, horizon, a willing
+    assistant). Ask: AskSettings."""
     rooms: bool = True
     """False: requests in a generated flat name no room (VNLA); those of a data set are as it was built."""
     assistant: Assistant | str | None = None
