@@ -78,7 +78,6 @@ class AskStudy(StudyLearner):
     """All that its answers depend on."""
 
     name = "ask"
-    judges = ("embodied.agents.ask.learned", "embodied.agents.ask.study")
 
     def tables(self) -> Mapping[str, StudyTable]:
         model, columns = (_rule(MODEL),) if self.model else (), (*ASK.columns, *ASK.metrics, *metrics.USAGE)

@@ -40,7 +40,6 @@ class BanditStudy(StudyLearner):
     """Who rates in the table 'people': the rater that people were found to resemble."""
 
     name = "bandit"
-    judges = ("embodied.agents.bandit.training",)
 
     def tables(self) -> Mapping[str, StudyTable]:
         tables = study_tables("bandit")

@@ -99,7 +99,10 @@ class ImitationSettings(ValidatedRunSettings):
     instruction_length: AtLeastOne = 50
     """Longest instruction, words."""
     validation_tasks: AtLeastOne = 200
-    """Tasks of each validation."""
+    hidden_size: AtLeastOne = 256
+    """Width of the networks."""
+    dropout: NotAll = 0.3
+    """Dropout rate in training, of features and hidden units."""
 
 
 def scales(kind: type[C], name: str) -> Mapping[str, C]:

@@ -31,7 +31,6 @@ from embodied.agents.common.weights import check_features, load_into, load_weigh
 from embodied.agents.find.network import READ, Explorer, SeekNetwork
 from embodied.agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, imitation_loss
 from embodied.agents.learners.find import THINGS, FinderConfig
-from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import FeatureBank
@@ -274,8 +273,6 @@ class FindStudy(SightedStudy):
     """Tasks of each house that agents are judged on."""
 
     name, agent_kind = "find", Finder
-    makers = ("embodied.agents.find.study",)
-    judges = (*JUDGES, "embodied.agents.find.study")
 
     def tables(self) -> Mapping[str, StudyTable]:
         """Of houses as they are; of a data set of the kind 'doors', with closed doors."""

@@ -11,7 +11,6 @@ from typing import Any
 from embodied.agents.common.session import Note
 from embodied.agents.hanna.agent import HannaAgent, HannaLearner, by_the_text, hanna_policies
 from embodied.agents.learners.hanna import HannaEvaluation, TrainingConfig
-from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
 from embodied.agents.vision.sighted_study import TEST_SPLITS as TEST
 from embodied.agents.vision.sighted_study import SightedStudy, TrainingData
@@ -44,8 +43,6 @@ class HannaStudy(SightedStudy):
     device: str = "cpu"
 
     name, agent_kind, learner = "hanna", HannaAgent, HannaLearner
-    makers = ("embodied.agents.hanna.agent",)
-    judges = (*JUDGES, "embodied.agents.hanna.agent")
 
     def tables(self) -> Mapping[str, StudyTable]:
         """Splits out of distribution come beside the test splits."""

@@ -18,7 +18,7 @@ from embodied.agents.hari.networks import INTENTIONS, Executor, HariAgent, load_
 from embodied.agents.hari.policy import ASKS, DO, DONE, Belief, Reader, action_of, available, carry, consider, policy_of
 from embodied.agents.learners.hari import ExecutionConfig, IntentionConfig
 from embodied.agents.studies.engine import Measured
-from embodied.agents.studies.episodes import JUDGES, EpisodeStudy
+from embodied.agents.studies.episodes import EpisodeStudy
 from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
 from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation.tables import Samples
@@ -198,8 +198,6 @@ class HariStudy(EpisodeStudy):
     to learn from; None: in `data`."""
 
     name = "hari"
-    makers = ("embodied.agents.hari.run",)
-    judges = (*JUDGES, "embodied.agents.hari.study", "embodied.agents.hari.run")
 
     def tables(self) -> Mapping[str, StudyTable]:
         """The splits out of distribution come beside those of the tests; elsewhere, houses may all be unknown."""
@@ -218,7 +216,7 @@ class HariStudy(EpisodeStudy):
         walking = self._walking(folder)
         begin = weights_digest(walking) if walking.exists() else None
         data = dataset_of(self.data, "hari").digest
-        return identity_of(*self.makers, settings=self.settings(train, seed), data=data, begin=begin)
+        return identity_of(type(self).__module__, settings=self.settings(train, seed), data=data, begin=begin)
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Train the execution policy that intention policies use."""

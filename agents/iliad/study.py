@@ -35,8 +35,6 @@ class IliadStudy(StudyLearner):
     repeats: tuple[int, ...]
     threads: int = 1
 
-    judges = ("embodied.agents.iliad.training", "embodied.agents.iliad.regex.run", "embodied.agents.iliad.nav.run")
-
     @property
     def name(self) -> str:
         return f"iliad-{self.setup.name}"

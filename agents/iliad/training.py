@@ -4,6 +4,7 @@ batches are drawn by (seed, update)."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,9 +14,9 @@ import torch
 from torch import Tensor, nn
 
 from embodied.agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate, tasks_of_update
-from embodied.agents.common.weights import Stateful, load_into, origin_of, read_weights, save_weights
+from embodied.agents.common.weights import Stateful, load_into, origin_of, read_weights, save_weights, seeded
 from embodied.agents.iliad import protocol
-from embodied.agents.learners.iliad import LearnerConfig, mixing_at
+from embodied.agents.learners.iliad import LearnerConfig, TeacherConfig, mixing_at
 from embodied.records import Identity, differences, identity_of
 from embodied.seeds import stream
 
@@ -24,7 +25,17 @@ COOLDOWN = 0.4
 CLIP = 5.0
 REPORT = 250
 """Updates between judgings."""
+OF_OTHERS = (
+    *("teacher", "candidates", "unlabeled", "blind"),
+    *("executor_iterations", "describer_iterations", "pretraining_iterations"),
+)
+"""Settings on which what a stage gives does not depend, or that are its own number of updates."""
 Network = TypeVar("Network", bound=nn.Module)
+
+
+def begun(world: str, seed: int, name: str) -> AbstractContextManager[None]:
+    """The first weights of a network follow from these inside."""
+    return seeded(int(stream(seed, world, "begin", name).integers(2**31)))
 
 
 def teach(
@@ -36,8 +47,8 @@ def teach(
     world: str,
     folder: Path,
     updates: int,
-    rate: float,
     seed: int,
+    config: TeacherConfig,
     about: object,
     note: Note,
     **depends: object,
@@ -46,21 +57,21 @@ def teach(
 
     Args:
       world: 'regex' or 'nav'; draws are named by it.
-      rate: Adam's learning rate.
       about: stands beside the weights (embodied.agents.common.weights).
       depends: all that the network depends on besides name, updates and seed.
     """
+    depends["settings"] = {k: v for k, v in vars(config).items() if k not in OF_OTHERS}
     identity = identity_of(f"embodied.agents.iliad.{world}.run", stage=name, updates=updates, seed=seed, **depends)
     path = folder / f"{name}.safetensors"
     if path.exists() and not differences(origin_of(path) or {}, identity):
         load_into(network, read_weights(path), path)
         return network.eval()
-    optimizer = torch.optim.Adam(network.parameters(), rate, fused=True)
+    optimizer = torch.optim.Adam(network.parameters(), config.teacher_rate, fused=True)
     network.train()
     parts: dict[str, Stateful] = {"network": network, "adam": optimizer}
     with Session(folder / name, identity, parts, updates, checkpoint_minutes=2.0, every=REPORT, note=note) as session:
         for update in session:
-            set_learning_rate(optimizer, rate, update, updates, COOLDOWN)
+            set_learning_rate(optimizer, config.teacher_rate, update, updates, COOLDOWN)
             with seeded_dropout(seed, update):
                 loss = loss_of(stream(seed, world, name, update))
             descend(loss, optimizer, f"{name}, update {update}", CLIP)

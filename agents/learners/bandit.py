@@ -42,7 +42,6 @@ class BanditConfig(RunSettings):
     clip: Positive = 5.0
     """Largest gradient norm, that of the authors' program (docs/sources.md, S73)."""
     checkpoint_minutes: Positive = 2.0
-    """Minutes between checkpoints."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from embodied.agents.common.settings import AtLeastOne, ImitationSettings, NotAll, Positive, Share
+from embodied.agents.common.settings import AtLeastOne, ImitationSettings, Positive, Share
 from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import TRAINING, Encoded, Repeated, StudyOptions, WithData, study_by
 from embodied.options import Count, Option, Settings
@@ -29,17 +29,10 @@ class FinderConfig(ImitationSettings):
     """Ablations of vision: 'all': none; 'map': the network sees black pictures, its map still recognises places;
     'nothing': both see black pictures."""
     hidden_size: AtLeastOne = 128
-    """Width of the network."""
-    dropout: NotAll = 0.3
-    """Dropout rate of features and hidden units."""
     iterations: AtLeastOne = 800
-    """Updates of the weights."""
     learning_rate: Positive = 3e-3
-    """Learning rate of Adam."""
     cooldown: Share = 0.5
-    """The last share of the updates, over which the learning rate falls to zero."""
     validate_every: AtLeastOne = 400
-    """Updates between validations."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -92,8 +92,6 @@ class TrainingConfig(settings.ImitationSettings):
 
     model: Annotated[str, Option(words=MODELS)] = "hanna"
     """'hanna' (appendix D.2) or 'lstm' (the encoder-decoder of Table 4.6)."""
-    hidden_size: settings.AtLeastOne = 256
-    """Width of both networks."""
     navigation_embedding: settings.AtLeastOne = 256
     """Width of an embedded navigation action."""
     ask_embedding: settings.AtLeastOne = 128
@@ -102,10 +100,7 @@ class TrainingConfig(settings.ImitationSettings):
     """Number of self-attention heads."""
     text_heads: settings.AtLeastOne = 8
     """Number of instruction-attention heads."""
-    dropout: settings.NotAll = 0.3
-    """Dropout rate in training."""
     iterations: settings.AtLeastOne = 30_000
-    """Updates of the weights."""
     training_steps: settings.AtLeastOne = 20
     """Horizon of training episodes."""
     alpha: settings.NotNegative = 1.0

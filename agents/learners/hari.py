@@ -32,7 +32,6 @@ class ExecutionConfig(settings.ValidatedRunSettings):
     dropout: settings.NotAll = 0.1
     """Dropout rate in training."""
     iterations: settings.AtLeastOne = 100_000
-    """Updates of the weights."""
     horizon: settings.AtLeastOne = 15
     """Longest pre-training episode, steps."""
     guided: settings.Share = 0.0
@@ -66,7 +65,6 @@ class IntentionConfig(settings.ValidatedRunSettings):
     hidden_size: settings.AtLeastOne = 512
     """Width of the recurrent networks."""
     learning_rate: settings.Positive = 1e-5
-    """Learning rate of Adam."""
     critic_iterations: settings.Whole = 5_000
     """Updates of the critic alone, before both are trained."""
     iterations: settings.AtLeastOne = 50_000
@@ -92,7 +90,6 @@ class IntentionConfig(settings.ValidatedRunSettings):
     perfect: bool = False
     """Reach sub-goals perfectly, whatever the execution policy does (the skyline of Table 4.7)."""
     validate_every: settings.AtLeastOne = 250
-    """Updates between validations."""
     validation_tasks: settings.AtLeastOne = 300
     """Tasks of each validation, a third from each of its conditions."""
 

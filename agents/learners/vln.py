@@ -26,9 +26,7 @@ class FollowerSettings(settings.ImitationSettings):
     """How a follower is trained."""
 
     hidden_size: settings.AtLeastOne = 512
-    """Width of the networks."""
     dropout: settings.NotAll = 0.2
-    """Dropout rate in training."""
     forcing: Annotated[str, Option(words=FORCING)] = "dagger"
     """Who acts in training: 'teacher', 'student' or 'dagger'."""
     blind: bool = False
@@ -44,9 +42,7 @@ class FollowerSettings(settings.ImitationSettings):
     least_teacher: settings.Share = 0.0
     """Lowest share of steps taken by the teacher in 'dagger', reached halfway."""
     iterations: settings.AtLeastOne = 20_000
-    """Updates of the weights."""
     batch: settings.AtLeastOne = 64
-    """Episodes per update."""
     instruction_length: settings.AtLeastOne = 80
     """Longest instruction, words; the rest is cut."""
 

@@ -32,20 +32,17 @@ class VnlaSettings(settings.ImitationSettings):
     budget_embedding: settings.AtLeastOne = 16
     """Width of the embedded number of remaining requests."""
     dropout: settings.NotAll = 0.5
-    """Dropout rate in training."""
     iterations: settings.AtLeastOne = 100_000
     """Updates of the weights; the program's direct-mute agents: 70,000."""
     looking: settings.Whole = 10_000
     """How many updates, at the start, only teach to read panoramas."""
     batch: settings.AtLeastOne = 100
-    """Episodes per update."""
     blind: bool = False
     """Ablation without vision: all features are zero."""
     rules: Annotated[str, Option(words=tuple(RULES_OF_PLAY))] = "indirect"
     """Rule of play in evaluation. An agent of 'indirect' is trained under 'direct': the advisor's actions replace the
     learner's while what it said is in force, as in the program (docs/sources.md, S112)."""
     validate_every: settings.AtLeastOne = 1000
-    """Updates between validations."""
 
 
 VNLA_SCALES = settings.scales(VnlaSettings, "vnla")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import torch
 
@@ -36,11 +36,12 @@ class EpisodeStudy(StudyLearner):
     """Seeds of what is drawn in judging; the same tasks are judged with each."""
     threads: int = 1
 
-    makers: ClassVar[tuple[str, ...]] = ()
-    """Modules that decide what is trained."""
-    judges: ClassVar[tuple[str, ...]] = JUDGES
     batch = 32
     """Episodes judged side by side; has no influence on results."""
+
+    @property
+    def judges(self) -> tuple[str, ...]:
+        return (*JUDGES, type(self).__module__)
 
     # What a learner says ------------------------------------------------------------------------
 
@@ -77,7 +78,7 @@ class EpisodeStudy(StudyLearner):
     # What the engine asks -----------------------------------------------------------------------
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Identity:
-        return identity_of(*self.makers, settings=self.settings(train, seed), **self.depends(train))
+        return identity_of(type(self).__module__, settings=self.settings(train, seed), **self.depends(train))
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return {"data": self.judged_in(row.judge).digest, "tasks": self.tasks, "judging": self.eval_seeds}

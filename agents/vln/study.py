@@ -20,7 +20,6 @@ from embodied.agents.common import imitation
 from embodied.agents.common.tensors import IGNORE, choose_sampled, negative_log_likelihood
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.learners.vln import FollowerSettings
-from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import study_tables
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import SightedLearner, SightedStudy, Split, TrainingData
@@ -128,5 +127,3 @@ class VlnStudy(SightedStudy):
     config: FollowerSettings
 
     name, agent_kind, learner, all_tables = "vln", VlnAgent, VlnLearner, study_tables("vln")
-    makers = ("embodied.agents.vln.study",)
-    judges = (*JUDGES, "embodied.agents.vln.policy")

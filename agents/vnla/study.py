@@ -28,7 +28,6 @@ from embodied.agents.common.tensors import choose_at, negative_log_likelihood
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features
 from embodied.agents.learners.vnla import VnlaSettings
-from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import study_tables
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import SightedLearner, SightedStudy, Split, TrainingData
@@ -181,8 +180,6 @@ class VnlaStudy(SightedStudy):
     eval_seeds: tuple[int, ...] = EVALUATION_SEEDS
 
     name, agent_kind, learner, all_tables = "vnla", VnlaAgent, VnlaLearner, study_tables("vnla")
-    makers = ("embodied.agents.vnla.study",)
-    judges = (*JUDGES, "embodied.agents.vnla.study")
 
     def policies(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:

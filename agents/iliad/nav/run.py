@@ -15,7 +15,7 @@ from torch import Tensor
 from embodied.agents.common.session import Note
 from embodied.agents.common.tensors import greedy_choice
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
-from embodied.agents.common.weights import load_into, load_weights, save_weights, seeded
+from embodied.agents.common.weights import check_features, load_into, load_weights, save_weights
 from embodied.agents.iliad.nav.student import NAV_SPLITS, LoopFree, NavData, NavEyes, NavStudent
 from embodied.agents.iliad.nav.teacher import (
     LONGEST_DESCRIPTION,
@@ -27,7 +27,7 @@ from embodied.agents.iliad.nav.teacher import (
 )
 from embodied.agents.iliad.nav.world import HORIZON, NavMarginal, NavWorld, Trip, trips_of, walk_along
 from embodied.agents.iliad.protocol import DescribingTeacher
-from embodied.agents.iliad.training import IliadProblem, asked, drawn, success_rate, successes, teach
+from embodied.agents.iliad.training import IliadProblem, asked, begun, drawn, success_rate, successes, teach
 from embodied.agents.iliad.writing import likelihood_loss
 from embodied.agents.learners.iliad import NavConfig
 from embodied.agents.learners.vln import FollowerSettings
@@ -62,13 +62,8 @@ class NavAbout:
 def new_follower(config: NavConfig, eyes: NavEyes, seed: int, name: str) -> FollowerNetwork:
     """An untrained follower, which is VLN's; its weights follow from seed and name."""
     c = FollowerSettings(hidden_size=config.hidden_size, dropout=config.dropout)
-    with seeded(_beginning(seed, name)):
+    with begun("nav", seed, name):
         return FollowerNetwork(c, len(eyes.vocabulary), eyes.bank.size)
-
-
-def _beginning(seed: int, name: str) -> int:
-    """Names the first weights of a network."""
-    return int(stream(seed, "nav", "begin", name).integers(2**31))
 
 
 def teach_executor(data: NavData, config: NavConfig, folder: Path, *, note: Note) -> NavStudent:
@@ -95,7 +90,7 @@ def teach_describer(
 ) -> WalkDescriber:
     """P~_T(d | e) (3.2.4.1): the walk along a path to one of its requests; judged by who follows what it says."""
     eyes, world = data.eyes, NavWorld(data.eyes.places)
-    with seeded(_beginning(config.data_seed, "describer")):
+    with begun("nav", config.data_seed, "describer"):
         describer = WalkDescriber(len(eyes.vocabulary), config.hidden_size, config.heads, eyes.size, HORIZON)
     trips = data.splits["train"]
 
@@ -128,11 +123,7 @@ def load_follower(path: Path, eyes: NavEyes) -> NavStudent:
       FileNotFoundError, ValueError: missing, damaged, of another format, or taught with features of another encoder.
     """
     tensors, about = load_weights(path, "nav", NavAbout, NAV_REMEDY)
-    if about.encoder != eyes.bank.digest:
-        raise ValueError(
-            f"{path} was taught with features of encoder {about.encoder[:12]}, these are of {eyes.bank.digest[:12]}; "
-            "name it by --encoder"
-        )
+    check_features(eyes.bank.digest, about.encoder)
     c = about.config
     own = NavEyes(eyes.places, eyes.bank, Vocabulary(about.words))
     follower = new_follower(c, own, 0, "loaded")
@@ -147,10 +138,8 @@ def about_follower(config: NavConfig, eyes: NavEyes) -> NavAbout:
 
 def _settings(folder: Path, updates: int, config: NavConfig, data: NavData) -> dict[str, Any]:
     """How a network of the teacher is taught, and what it depends on."""
-    students = {"teacher", "candidates", "executor_iterations", "describer_iterations", "blind"}
-    settings = {k: v for k, v in vars(config).items() if k not in students}
-    how = {"world": "nav", "folder": folder, "updates": updates, "rate": config.teacher_rate, "seed": config.data_seed}
-    return {**how, "about": about_follower(config, data.eyes), "settings": settings, "data": data.digest}
+    how = {"world": "nav", "folder": folder, "updates": updates, "seed": config.data_seed, "config": config}
+    return {**how, "about": about_follower(config, data.eyes), "data": data.digest}
 
 
 def _sample(data: NavData) -> Sequence[Trip]:

@@ -46,25 +46,20 @@ class Ways:
     """Node to the action that leads there; the pose's own node to stopping."""
 
 
-@dataclass(frozen=True, eq=False)
 class NavEyes:
     """Everything that is seen in some houses; what a pose offers is computed once."""
 
-    places: Mapping[str, Place]
-    bank: FeatureBank
-    vocabulary: Vocabulary
-
-    def __post_init__(self) -> None:
+    def __init__(self, places: Mapping[str, Place], bank: FeatureBank, vocabulary: Vocabulary) -> None:
+        self.places, self.bank, self.vocabulary = places, bank, vocabulary
         turned = np.arange(TURNS)[:, None] * (2 * np.pi / TURNS)
         yaws = torch.from_numpy(wrap(VIEW_YAWS - turned)).float()
         pitches = torch.from_numpy(VIEW_PITCHES).float().expand_as(yaws)
-        object.__setattr__(self, "_moves", PanoramicMoves())
-        object.__setattr__(self, "_directions", orientation(yaws, pitches, COPIES))  # (turns, 36, 4 COPIES)
-        object.__setattr__(self, "_ways", {})
+        self._directions = orientation(yaws, pitches, COPIES)  # (turns, 36, 4 COPIES)
+        self._moves, self._ways = PanoramicMoves(), dict[tuple[str, int, int], Ways]()
 
     def blind(self) -> NavEyes:
         """In the same houses, seeing nothing."""
-        return dataclasses.replace(self, bank=self.bank.blind())
+        return NavEyes(self.places, self.bank.blind(), self.vocabulary)
 
     @property
     def size(self) -> int:
@@ -77,11 +72,10 @@ class NavEyes:
 
     def ways(self, world: str, pose: Pose) -> Ways:
         """The actions that are possible there."""
-        known: dict[tuple[str, int, int], Ways] = self._ways  # type: ignore[attr-defined]
         key = world, pose.node, pose.turn
-        if key not in known:
-            known[key] = self._look(world, pose)
-        return known[key]
+        if key not in self._ways:
+            self._ways[key] = self._look(world, pose)
+        return self._ways[key]
 
     def see(self, tracks: Sequence[Track], channels: Tensor | None = None) -> FollowerViews:
         """The views of agents where they are.
@@ -89,9 +83,8 @@ class NavEyes:
         Args:
           channels: (B, D) what each of them sees of every feature channel.
         """
-        directions: Tensor = self._directions  # type: ignore[attr-defined]
         views = self.bank.gather([Sight(k.world, k.pose.node) for k in tracks])
-        views = torch.cat([views, directions[[k.pose.turn for k in tracks]]], -1)
+        views = torch.cat([views, self._directions[[k.pose.turn for k in tracks]]], -1)
         towards = [k.ways.towards for k in tracks]
         actions = nn.utils.rnn.pad_sequence(towards, batch_first=True)
         counts = torch.tensor([1 + len(a) for a in towards])
@@ -102,9 +95,8 @@ class NavEyes:
         return FollowerViews(views, actions, mask)
 
     def _look(self, world: str, pose: Pose) -> Ways:
-        moves: PanoramicMoves = self._moves  # type: ignore[attr-defined]
         place = self.places[world]
-        candidates, poses = moves.at(place, pose)
+        candidates, poses = self._moves.at(place, pose)
         (views,) = self.bank.gather([Sight(world, pose.node)])
         angles = orientation(torch.from_numpy(candidates.bearing), torch.from_numpy(candidates.slope), COPIES)
         kind = lambda node: place.house.room_by_id[str(place.graph.room_of_node[node])].kind

@@ -15,7 +15,7 @@ from torch import Tensor
 from embodied.agents.common.session import Note
 from embodied.agents.common.tensors import greedy_choice
 from embodied.agents.common.vocabulary import Vocabulary
-from embodied.agents.common.weights import load_into, load_weights, save_weights, seeded
+from embodied.agents.common.weights import load_into, load_weights, save_weights
 from embodied.agents.iliad.protocol import NOTHING, DescribingTeacher
 from embodied.agents.iliad.regex.data import RegexData, WordTask, make_data, rules_without_requests
 from embodied.agents.iliad.regex.rules import (
@@ -29,7 +29,7 @@ from embodied.agents.iliad.regex.rules import (
     texts,
 )
 from embodied.agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher, RegexMarginal, RegexStudent, RegexWorld
-from embodied.agents.iliad.training import IliadProblem, Network, asked, drawn, successes, teach
+from embodied.agents.iliad.training import IliadProblem, Network, asked, begun, drawn, successes, teach
 from embodied.agents.iliad.writing import likelihood_loss
 from embodied.agents.learners.iliad import RegexConfig
 from embodied.assets.cache import digest
@@ -38,11 +38,6 @@ from embodied.records import identity_of
 from embodied.seeds import stream
 
 REGEX_REMEDY = "delete it and train it again with `embodied train iliad regex`"
-_OF_OTHERS = (
-    *("teacher", "candidates", "unlabeled"),
-    *("executor_iterations", "describer_iterations", "pretraining_iterations"),
-)
-"""Settings on which what a stage gives does not depend, or that are its own number of updates."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +51,7 @@ class RegexAbout:
 
 def new_network(kind: Callable[..., Network], config: RegexConfig, requests: Requests, seed: int, name: str) -> Network:
     """An untrained speller or describer; its weights follow from seed and name."""
-    with seeded(int(stream(seed, "regex", "begin", name).integers(2**31))):
+    with begun("regex", seed, name):
         return kind(len(requests.vocabulary), config.hidden_size, config.word_size, config.character_size)
 
 
@@ -132,10 +127,9 @@ def executor_success(executor: Speller, requests: Requests, items: Sequence[Word
 
 def _settings(folder: Path, updates: int, config: RegexConfig, requests: Requests, seed: int) -> dict[str, Any]:
     """How a network is taught, and what it depends on."""
-    settings = {k: v for k, v in vars(config).items() if k not in _OF_OTHERS}
-    how = {"world": "regex", "folder": folder, "updates": updates, "rate": config.teacher_rate, "seed": seed}
     words = requests.vocabulary.words
-    return {**how, "about": RegexAbout(config, words), "settings": settings, "words": digest(words)}
+    how = {"world": "regex", "folder": folder, "updates": updates, "seed": seed, "config": config}
+    return {**how, "about": RegexAbout(config, words), "words": digest(words)}
 
 
 VALIDATION_REQUESTS = 500
