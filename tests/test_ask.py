@@ -23,13 +23,12 @@ from embodied.assistants.ask import in_view
 from embodied.cli import main as start
 from embodied.envs.ask import AskSettings, Prices
 from embodied.evaluation import tables
-from embodied.evaluation.asking import ask_counts, late_env
-from embodied.evaluation.evaluate import play, read_seeds, submitted
+from embodied.evaluation.evaluate import late_env, play, read_seeds, submitted
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.sensors import SensorSuite
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.interface import Ask, Intention, Move, Pose, Stop
-from embodied.kinds.metrics import success
+from embodied.kinds.metrics import ask_counts, success
 from embodied.kinds.shipped.ask import ASK, ask_environments, price, success_progress, weighted_success
 from embodied.language.templates import intention_of
 from embodied.policies.ask import ASKER_RULES, COLLECT, Asker, CollectThenSplit, EpisodeMemory

@@ -10,7 +10,6 @@ import pytest
 from hand_worlds import line_world
 
 from embodied.envs.base import HelpEnv
-from embodied.evaluation.asking import ask_counts
 from embodied.interface import (
     Ask,
     FindObject,
@@ -26,6 +25,7 @@ from embodied.interface import (
     Trajectory,
 )
 from embodied.kinds import metrics
+from embodied.kinds.metrics import ask_counts
 
 
 def task(radius: float = 0.0, start: int = 0, goals: tuple[int, ...] = (3,), horizon: int = 9) -> Task:

@@ -19,8 +19,7 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import StoredPlace
 from embodied.envs.base import HelpEnv
-from embodied.evaluation.asking import late_env
-from embodied.evaluation.evaluate import play, spread
+from embodied.evaluation.evaluate import late_env, play, spread
 from embodied.evaluation.tables import measured
 from embodied.generate import HouseConfig
 from embodied.interface import Agent, Task

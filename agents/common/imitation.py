@@ -20,7 +20,7 @@ import torch
 from torch import Tensor, nn
 
 from embodied.agents.common import session as sessions
-from embodied.agents.common.settings import MAY_CHANGE, EvaluationSettings, ImitationSettings
+from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.common.weights import half_precision, load_into, load_weights, save_weights, seeded
 from embodied.envs.base import HelpEnv
@@ -238,7 +238,7 @@ def train(
     )
     parts: dict[str, Any] = {"network": learner.network, "optimizer": learner.optimizer}
     judge = lambda session: validate(learner, validation, session)
-    done = sessions.run(folder, identity, parts, learner.config, learner.learn, judge, may_change=MAY_CHANGE, **options)
+    done = sessions.run(folder, identity, parts, learner.config, learner.learn, judge, **options)
     learner.network.eval()
     return done
 

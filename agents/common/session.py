@@ -35,6 +35,8 @@ Note = Callable[[str], None]
 T = TypeVar("T")
 EVERY = 20
 """Updates per progress line."""
+MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes", "validate_every", "validation_tasks")
+"""Of the settings of a run, those that may differ on resuming without changing what was learned so far."""
 
 
 class DivergedError(UnableError):
@@ -249,8 +251,6 @@ def run(
     config: Any,
     step: Callable[[int], Mapping[str, float]],
     validate: Callable[[Session], Sequence[Episode]],
-    *,
-    may_change: Collection[str],
     **options: Unpack[Options],
 ) -> Progress:
     """Train `parts` in place, from `folder`'s checkpoint if there is one.
@@ -260,7 +260,6 @@ def run(
       config: settings over ValidatedRunSettings.
       step: does an update, and returns the numbers to report.
       validate: evaluates, keeps the weights if they are the best, and returns the episodes.
-      may_change: names of settings that may differ on resuming.
 
     Raises:
       DivergedError: a loss or gradient is not finite; the last checkpoint is intact.
@@ -270,7 +269,7 @@ def run(
       KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
     """
     how: dict[str, Any] = {"minutes": options.get("minutes"), "note": options.get("note", print)}
-    how |= {"may_change": may_change, "checkpoint_minutes": config.checkpoint_minutes}
+    how |= {"may_change": MAY_CHANGE, "checkpoint_minutes": config.checkpoint_minutes}
     with Session(folder, identity, parts, config.iterations, **how) as session:
         for update in session:
             session.add(step(update))

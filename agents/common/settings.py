@@ -111,10 +111,6 @@ def scales(kind: type[C], name: str) -> Mapping[str, C]:
     return {scale: kind(**changed) for scale, changed in changes.items()}
 
 
-MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes")
-"""Of the settings of a run, those that may differ on resuming without changing what was learned so far."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class EvaluationSettings(Checked):
     """How an agent that learns by imitation is evaluated, in validations too."""

@@ -33,9 +33,6 @@ from embodied.records import Identity
 from embodied.seeds import stream
 from embodied.teachers.shortest import shortest_action
 
-MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes", "validate_every", "validation_tasks")
-"""Settings that may differ on resuming."""
-
 
 @dataclass(frozen=True, eq=False)
 class PretrainingData:
@@ -82,7 +79,7 @@ def pretrain(
 
     parts: dict[str, Stateful] = {"network": network, "optimizer": optimizer}
     step = lambda update: train_step(executor, optimizer, source, update)
-    done = sessions.run(folder, identity, parts, config, step, validate, may_change=MAY_CHANGE, **options)
+    done = sessions.run(folder, identity, parts, config, step, validate, **options)
     network.eval()
     return done
 

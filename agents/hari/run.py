@@ -39,8 +39,6 @@ from embodied.interface import Action, Ask, Episode, Move, Place
 from embodied.kinds import metrics
 from embodied.records import Identity, identity_of
 
-MAY_CHANGE = ("iterations", "checkpoint_minutes", "validate_every", "validation_tasks")
-
 
 def train(
     agent: networks.HariAgent,
@@ -71,7 +69,7 @@ def train(
 
     step = lambda update: train_step(learning, training, update)
     whole = dataclasses.replace(config, iterations=config.updates)
-    return run(folder, identity, learning.parts, whole, step, validate, may_change=MAY_CHANGE, **options)
+    return run(folder, identity, learning.parts, whole, step, validate, **options)
 
 
 class IntentionRun:

@@ -151,7 +151,7 @@ class Evaluation:
     def changed(self, split: SplitData) -> SplitData:
         """The split with this assistant, these doors, this moment of asking and episodes of at most --steps."""
         from embodied.envs.base import DoorRule
-        from embodied.evaluation.asking import late_env
+        from embodied.evaluation.evaluate import late_env
         from embodied.tasks.goals import with_closed_doors
 
         if steps := self.args.steps:

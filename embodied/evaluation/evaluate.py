@@ -10,9 +10,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.tables import Row, row
-from embodied.interface import Agent, Episode, Observation, SeenPlace, Situation, Step, Task, act
+from embodied.interface import (
+    Agent,
+    Assistant,
+    Episode,
+    Intention,
+    Observation,
+    Reply,
+    SeenPlace,
+    Situation,
+    Step,
+    Task,
+    act,
+)
 from embodied.kinds.plugins import made_by_name
 from embodied.kinds.task_kind import kind_named
 from embodied.seeds import stream
@@ -196,3 +210,23 @@ def submitted(where: str) -> Agent:
     if hasattr(agent, "act_privileged") or not hasattr(agent, "act"):
         raise ValueError(f"{file}: an agent has `act` and is not shown the situations")
     return agent
+
+
+def late_env(make_env: Callable[[], HelpEnv], share: float) -> HelpEnv:
+    """An environment in which nobody can be asked before a share of the task's steps has passed."""
+    env = make_env()
+    env.assistant = env.assistant and LateAssistant(env.assistant, share)
+    return env
+
+
+@dataclass(frozen=True)
+class LateAssistant:
+    assistant: Assistant
+    share: float
+
+    def intentions(self, situation: Situation) -> tuple[Intention, ...]:
+        early = situation.time < self.share * situation.task.horizon
+        return () if early else self.assistant.intentions(situation)
+
+    def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
+        return self.assistant.answer(situation, question, rng=rng)

@@ -13,7 +13,6 @@ import numpy as np
 from scipy.special import stdtrit
 
 from embodied.assets.cache import write_bytes
-from embodied.evaluation.asking import AskCounts, ask_counts
 from embodied.interface import Episode
 from embodied.kinds import metrics
 from embodied.kinds.task_kind import kind_named, known_kinds
@@ -177,7 +176,7 @@ def measured(episodes: Sequence[Episode], graphs: Mapping[str, NavGraph]) -> dic
     for name, metric in kind.metrics.items():
         samples[name] = Samples(of(metric.of), houses, of(metric.per) if metric.per else (), metric.share)
     if kind.help != "none":
-        samples |= _asking([*of(ask_counts)], houses)
+        samples |= _asking([*of(metrics.ask_counts)], houses)
     used = [metrics.usage(e) for e in episodes]
     if any(used):
         for name, count in metrics.USAGE.items():
@@ -191,8 +190,8 @@ def measured(episodes: Sequence[Episode], graphs: Mapping[str, NavGraph]) -> dic
     return samples
 
 
-def _asking(counts: Sequence[AskCounts], houses: tuple[str, ...]) -> dict[str, Samples]:
-    """The measures of `ask_counts`."""
+def _asking(counts: Sequence[metrics.AskCounts], houses: tuple[str, ...]) -> dict[str, Samples]:
+    """The measures of `metrics.ask_counts`."""
     ratio = lambda some, all_: Samples(tuple(map(float, some)), houses, tuple(map(float, all_)))
     needed, blockers = [c.needed for c in counts], [c.needed + c.left for c in counts]
     return {

@@ -6,13 +6,15 @@ its world; tables over many episodes are in embodied.evaluation.tables.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from embodied.action_spaces import doors_in
-from embodied.interface import Ask, Episode, Intention, Move, SuccessRule, Trajectory, Usage
+from embodied.interface import Ask, Episode, FindDescribed, Intention, Move, SuccessRule, Trajectory, Usage
 from embodied.kinds.task_kind import Measure, kind_named
 from embodied.navigation.graph import OPENING, behind_doors
 
@@ -89,8 +91,7 @@ def mistake_repeats(episode: Episode, graph: NavGraph) -> tuple[int, int]:
     A mistake is a navigation action that the teacher would not take; it repeats when the same
     wrong next node was chosen before at this node, with this instruction and these targets.
     """
-    wrong: set[tuple[object, ...]] = set()
-    repeats = 0
+    wrong = list[tuple[object, ...]]()
     for step in episode.steps:
         if isinstance(step.action, Ask):
             continue
@@ -98,24 +99,69 @@ def mistake_repeats(episode: Episode, graph: NavGraph) -> tuple[int, int]:
         target = min(step.targets, key=lambda g: (graph.distance[here, g], g))
         reference = here if here == target else int(graph.next_hop[here, target])
         chosen = step.candidate_nodes[step.action.candidate] if isinstance(step.action, Move) else here
-        if chosen == reference:
-            continue
-        key = (here, step.instruction, tuple(sorted(step.targets)), chosen)
-        repeats += key in wrong
-        wrong.add(key)
-    return repeats, len(episode.steps)
+        if chosen != reference:
+            wrong.append((here, step.instruction, tuple(sorted(step.targets)), chosen))
+    return len(wrong) - len({*wrong}), len(episode.steps)
 
 
 def request_repeats(episode: Episode, graph: NavGraph) -> tuple[int, int]:
     """Requests made before at the same node, instruction and targets, and all requests (Table 4.6)."""
-    seen: set[tuple[object, ...]] = set()
-    repeats = 0
-    for step in episode.steps:
+    made = [(s.pose.node, s.instruction, frozenset(s.targets)) for s in episode.steps if isinstance(s.action, Ask)]
+    return len(made) - len({*made}), len(made)
+
+
+@dataclass(frozen=True)
+class AskCounts:
+    """Numbers of one episode, whose sums over episodes make the measures below."""
+
+    questions: int
+    needed: int
+    """Questions that were needed; each clears one blocker."""
+    left: int
+    """1 if a blocker is left at the end."""
+
+
+def ask_counts(episode: Episode, graph: NavGraph) -> AskCounts:
+    """Questions and blockers of an episode, for question precision (needed / questions), the share of blockers cleared
+    (needed / (needed + left)) and their harmonic mean, Ask-F1 (2 needed / (questions + needed + left)).
+
+    After HiL-Bench (Elfeki et al. 2026, arXiv 2604.09408), where a blocker is information that a task lacks and that no
+    exploring brings, and precise questions are those about blockers. Theirs were written by people; ours follow from
+    the truth:
+
+      Ask-v0: one is blocked while the request and the answers fit several things. A question was needed if its answer
+        rules out one of them, or tells a route to its end.
+      HANNA, VNLA, HARI: one is blocked where one does not get on by oneself. A question on a way that the last answer
+        tells in words, short of its end, was not needed. Another was needed if the agent, before it asks the next such
+        question, comes nearer to a goal than it ever was, or succeeds. Who fails is blocked at the end.
+
+    What would have happened without the answer is not known: compare with the agent that never asks.
+    """
+    if isinstance(episode.task.goal, FindDescribed):
+        return _among_rivals(episode, episode.task.goal)
+    metres = np.asarray(graph.distance)[:, list(episode.task.goal_nodes)].min(axis=1)
+    steps, good = episode.steps, bool(success(episode, graph))
+    new, told_way = list[int](), tuple[int, ...]()
+    for t, step in enumerate(steps):
         if isinstance(step.action, Ask):
-            key = (step.pose.node, step.instruction, tuple(sorted(step.targets)))
-            repeats += key in seen
-            seen.add(key)
-    return repeats, len(seen) + repeats
+            new += [t] if step.pose.node not in told_way else []
+            told_way = step.reply.subtask.path[:-1] if step.reply and step.reply.text and step.reply.subtask else ()
+    needed = 0
+    for t, after in itertools.pairwise([*new, len(steps)]):
+        before = metres[[s.pose.node for s in steps[: t + 1]]].min()
+        nearer = metres[[s.next_pose.node for s in steps[t:after]]].min() < before - 1e-6
+        needed += int(nearer or (good and after == len(steps)))
+    return AskCounts(episode.requests, needed, int(not good))
+
+
+def _among_rivals(episode: Episode, goal: FindDescribed) -> AskCounts:
+    """Of Ask-v0: rivals are the things that fit and are not meant."""
+    rivals, needed = {*goal.fitting} - {goal.placement}, 0
+    for reply in (s.reply for s in episode.steps if s.reply is not None):
+        led = reply.subtask is not None and reply.subtask.target in episode.task.goal_nodes
+        left = set() if led else rivals - {*reply.ruled_out}
+        needed, rivals = needed + (left != rivals), left
+    return AskCounts(episode.requests, needed, int(bool(rivals)))
 
 
 def warping(distances: np.ndarray) -> float:
