@@ -6,7 +6,6 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -128,8 +127,8 @@ class Pool:
         return len(self.pairs)
 
 
-def build_pool(world: Place, classes: tuple[GoalClass, ...], *, seed: int, fewest: int, most: int, kind: str) -> Pool:
-    """Pairs whose shortest path to the nearest goal (in metres) has `fewest`..`most` nodes."""
+def build_pool(world: Place, classes: tuple[GoalClass, ...], config: FindConfig, *, seed: int) -> Pool:
+    """Pairs whose shortest path to the nearest goal (in metres) has as many nodes as it may have."""
     graph = world.graph
     hops = graph.hops + 1
     distance = np.asarray(graph.distance)
@@ -138,60 +137,31 @@ def build_pool(world: Place, classes: tuple[GoalClass, ...], *, seed: int, fewes
         goals = np.array(goal.goal_nodes)
         nearest = goals[np.argmin(distance[:, goals], axis=1)]
         nodes = hops[np.arange(len(hops)), nearest]
-        pairs += [(c, int(v)) for v in np.flatnonzero((nodes >= fewest) & (nodes <= most))]
+        pairs += [(c, int(v)) for v in np.flatnonzero((nodes >= config.fewest_nodes) & (nodes <= config.most_nodes))]
     table = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    order = stream(seed, "pool", kind, world.house.name).permutation(len(table))
+    order = stream(seed, "pool", config.kind, world.house.name).permutation(len(table))
     return Pool(world.house.name, classes, table[order])
 
 
 def find_pool(world: Place, *, seed: int, config: FindConfig = FindConfig()) -> Pool:
     classes = goal_classes(find_instances(world, config.reach), by_room=False, nearest_only=False)
-    return build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_nodes, kind=config.kind)
+    return build_pool(world, classes, config, seed=seed)
 
 
 def find_task(pool: Pool, index: int, *, seed: int, language: Language, config: FindConfig = FindConfig()) -> Task:
-    """Task `index` of the pool: a pure function of its arguments.
+    """Task `index` of the pool, with a random heading at the start: a pure function of its arguments.
 
     Raises:
       ValueError: the pool has no such task.
     """
-    c = config
-    return task_of_pair(c.kind, pool, index, seed=seed, language=language, radius=c.radius, horizon=c.horizon)
-
-
-def task_of_pair(
-    kind: str,
-    pool: Pool,
-    index: int,
-    *,
-    seed: int,
-    language: Language,
-    radius: float,
-    horizon: int,
-    budget: float | None = None,
-) -> Task:
-    """Pair `index` of the pool as a task of a kind, in words.
-
-    Raises:
-      ValueError: the pool has no such pair.
-    """
-    goal, start, rng = draw(pool, index, seed=seed, kind=kind)
-    what = FindObject(goal.object_class, goal.room_kind, goal.placements)
-    name, words = f"{pool.world}/{kind}/{index}", language.request(what, rng=rng)
-    return Task(name, kind, pool.world, start, what, goal.goal_nodes, words, radius, horizon, budget)
-
-
-def draw(pool: Pool, index: int, *, seed: int, kind: str) -> tuple[GoalClass, Pose, np.random.Generator]:
-    """Pair `index` of the pool with a random heading, and the generator for the rest of its words.
-
-    Raises:
-      ValueError: the pool has no such pair.
-    """
+    kind = config.kind
     if not 0 <= index < len(pool):
         raise ValueError(f"world {pool.world!r} has {len(pool)} {kind} tasks, asked for number {index}")
     c, node = (int(x) for x in pool.pairs[index])
-    rng = stream(seed, "task", kind, pool.world, index)
-    return pool.classes[c], Pose(node, int(rng.integers(TURNS))), rng
+    goal, rng = pool.classes[c], stream(seed, "task", kind, pool.world, index)
+    start, what = Pose(node, int(rng.integers(TURNS))), FindObject(goal.object_class, goal.room_kind, goal.placements)
+    name, words = f"{pool.world}/{kind}/{index}", language.request(what, rng=rng)
+    return Task(name, kind, pool.world, start, what, goal.goal_nodes, words, config.radius, config.horizon)
 
 
 def with_closed_doors(task: Task, place: Place, share: float, *, seed: int) -> Task:
@@ -216,12 +186,10 @@ def told_of_doors(task: Task, place: SeenPlace, language: Language[SeenPlace], *
 
 # VNLA: 'find a towel in a bathroom' with an advisor and a request budget (dissertation 4.1.2) ------
 
-FEWEST_NODES = 3
 MOST_ACTIONS = 25
 """Of the teacher, the final stop included, and of an episode (docs/sources.md, S45)."""
-VNLA_RADIUS, VNLA_REACH = 2.0, 2.5
-"""Metres from a goal node to succeed, and from a thing to its goal node. Limits of the VNLA program; the dissertation
-does not print them."""
+VNLA = FindConfig("vnla", reach=2.5, fewest_nodes=3, most_nodes=MOST_ACTIONS, radius=2.0, horizon=MOST_ACTIONS)
+"""Limits of the VNLA program; the dissertation does not print them."""
 
 
 def help_budget(horizon: int) -> float:
@@ -235,8 +203,8 @@ def vnla_pool(world: Place, plan: MonocularPlan, *, seed: int, by_room: bool = T
     Args:
       by_room: False gives the no-room variant: 'find a towel'.
     """
-    classes = goal_classes(find_instances(world, VNLA_REACH), by_room=by_room, nearest_only=True)
-    pool = build_pool(world, classes, seed=seed, fewest=FEWEST_NODES, most=MOST_ACTIONS, kind="vnla")
+    classes = goal_classes(find_instances(world, VNLA.reach), by_room=by_room, nearest_only=True)
+    pool = build_pool(world, classes, VNLA, seed=seed)
     return Pool(pool.world, classes, np.array([p for p in pool.pairs if _in_time(p, classes, plan)]).reshape(-1, 2))
 
 
@@ -271,10 +239,9 @@ def vnla_task(pool: Pool, index: int, world: Place, plan: MonocularPlan, *, seed
     Raises:
       ValueError: the pool has no such task.
     """
-    goal, start, _ = draw(pool, index, seed=seed, kind="vnla")
-    horizon = plan.count(start, goal.goal_nodes)
-    how: dict[str, Any] = {"radius": VNLA_RADIUS, "horizon": horizon, "budget": help_budget(horizon)}
-    return task_of_pair("vnla", pool, index, seed=seed, language=language, **how)
+    task = find_task(pool, index, seed=seed, language=language, config=VNLA)
+    horizon = plan.count(task.start, task.goal_nodes)
+    return dataclasses.replace(task, horizon=horizon, budget=help_budget(horizon))
 
 
 def room_kind(world: Place, node: int) -> str:

@@ -32,7 +32,7 @@ that node is its goal."""
 
 def hanna_pool(world: Place, *, seed: int) -> Pool:
     classes = goal_classes(find_instances(world, LIMITS.reach), by_room=False, nearest_only=True)
-    return build_pool(world, classes, seed=seed, fewest=LIMITS.fewest_nodes, most=LIMITS.most_nodes, kind=LIMITS.kind)
+    return build_pool(world, classes, LIMITS, seed=seed)
 
 
 hanna_task = functools.partial(find_task, config=LIMITS)

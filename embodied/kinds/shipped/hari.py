@@ -40,7 +40,7 @@ def hari_pool(world: Place, *, seed: int, config: FindConfig = LIMITS) -> Pool:
     classes = tuple(
         GoalClass(x.object_class, x.room_kind, (x.placement,), x.nodes[:1]) for x in find_instances(world, config.reach)
     )
-    return build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_nodes, kind="hari")
+    return build_pool(world, classes, config, seed=seed)
 
 
 hari_task = functools.partial(find_task, config=LIMITS)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from embodied.house.house import Placement
     from embodied.navigation.graph import NavGraph
 
-CONFIG = FindConfig(kind="stored", horizon=60)
+CONFIG = FindConfig(kind="stored", fewest_nodes=2, horizon=60)
 SEEN = 4
 """Pixels, of Sighting.pixels, from which on a thing in an open part counts as seen."""
 WITHIN_REACH, MOST_PARTS = 1.5, 8
@@ -114,7 +114,7 @@ def goals(place: interface.SeenPlace) -> tuple[GoalClass, ...]:
 
 def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.PartTasks:
     world = cast("interface.SeenPlace", inputs.world)
-    pool = build_pool(world, goals(world), seed=inputs.seed, fewest=2, most=CONFIG.most_nodes, kind=CONFIG.kind)
+    pool = build_pool(world, goals(world), CONFIG, seed=inputs.seed)
     task = lambda i: find_task(pool, i, seed=inputs.seed, language=inputs.language, config=CONFIG)
     return task_kind.parts_of_pool(len(pool), task, parts)
 
