@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Container, Iterable, Mapping
-from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -138,16 +137,6 @@ class PrivilegedAsking:
         return actions, (last, inner)
 
 
-@dataclass
-class _Trail:
-    """Memory of one episode."""
-
-    visited: Counter[int] = field(default_factory=Counter)
-    """Steps that began at each node."""
-    asked: set[int] = field(default_factory=set)
-    """Nodes where it asked."""
-
-
 class PerfectInterpreter(PerEpisodePolicy):
     """The skyline 'perfect assistance interpretation' for an agent without learning.
 
@@ -158,22 +147,22 @@ class PerfectInterpreter(PerEpisodePolicy):
     """
 
     def new_memory(self) -> Any:
-        return _Trail()
+        """Steps that began at each node, and nodes where it asked."""
+        return Counter[int](), set[int]()
 
     def act_one(self, o: Observation, s: Situation, memory: Any, rng: np.random.Generator) -> Action:
-        here, trail = s.pose.node, memory
-        trail.visited[here] += 1
+        here, (visited, asked) = s.pose.node, memory
+        visited[here] += 1
         if o.mode is Mode.SUB:
             return shortest_of(s)
         distance = s.world.graph.distance
-        if min(distance[s.pose.node, g] for g in s.task.goal_nodes) <= s.task.radius:
+        if min(distance[here, g] for g in s.task.goal_nodes) <= s.task.radius:
             return Stop()
-        if Intention.HELP in o.can_ask and here not in trail.asked:
-            trail.asked.add(here)
+        if Intention.HELP in o.can_ask and here not in asked:
+            asked.add(here)
             return Ask()
-        visits = np.array([trail.visited[v] for v in s.candidate_nodes])
-        fewest = np.flatnonzero(visits == visits.min())
-        return Move(int(rng.choice(fewest)))
+        visits = np.array([visited[v] for v in s.candidate_nodes])
+        return Move(int(rng.choice(np.flatnonzero(visits == visits.min()))))
 
 
 class RecognisingExplorer(PerEpisodePolicy):

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from embodied.house.contents import kept_in, part_of
-from embodied.interface import Action, Close, FindObject, Move, Observation, Open, SeenPlace, Situation, Stop, viewpoint
+from embodied.interface import Action, Close, FindObject, Observation, Open, SeenPlace, Situation, Stop, viewpoint
 from embodied.navigation.doors import place_named
-from embodied.navigation.graph import OPENING, behind_doors, nearest
+from embodied.navigation.graph import OPENING
 from embodied.policies.baselines import PerEpisodePolicy
+from embodied.teachers.shortest import shortest_of
 
 WITHIN = 2.0
 """Metres within which the wanderer takes a thing that it sees for found."""
@@ -23,7 +24,7 @@ class NeverOpens(PerEpisodePolicy):
     """The shortest way on which nothing is opened; stops at once where there is none."""
 
     def act_one(self, o: Observation, s: Situation, memory: Any, rng: np.random.Generator) -> Action:
-        return towards(s, s.targets, np.inf)
+        return shortest_of(s, opening=np.inf)
 
 
 class Wanderer(PerEpisodePolicy):
@@ -46,7 +47,7 @@ class Wanderer(PerEpisodePolicy):
         been, beside = memory
         been.add(s.pose.node)
         beside.update(s.candidate_nodes)
-        return Stop() if self._found(o, s, rng) else towards(s, sorted(beside - been), self._opening)
+        return Stop() if self._found(o, s, rng) else shortest_of(s, sorted(beside - been), self._opening)
 
     def _found(self, o: Observation, s: Situation, rng: np.random.Generator) -> bool:
         if self._worlds is None:
@@ -95,19 +96,4 @@ class Fetch(PerEpisodePolicy):
         assert isinstance(s.task.goal, FindObject), "it is told what it seeks"
         held = {*map(part_of, s.task.goal.placements)} if s.pose.node in s.targets else ()
         here = [k for k, part in s.extras.items() if part in held]
-        return Open(here[0]) if here and not {*here} & {*o.can_close} else towards(s, s.targets, OPENING)
-
-
-def towards(s: Situation, nodes: tuple[int, ...] | list[int], opening: float) -> Action:
-    """The next action on the shortest way to the nearest of some nodes; stop where there is none, or at it.
-
-    Args:
-      opening: metres that opening a door counts as; infinite for who opens none.
-    """
-    ways, here = behind_doors(s.world.graph, s.closed, opening), s.pose.node
-    goal = nearest(ways, here, nodes) if nodes else here
-    if goal == here or not np.isfinite(ways.distance[here, goal]):
-        return Stop()
-    step = int(ways.next_hop[here, goal])
-    chosen = s.candidate_nodes.index(step)
-    return Open(chosen) if s.world.graph.barred(here, step, s.closed) else Move(chosen)
+        return Open(here[0]) if here and not {*here} & {*o.can_close} else shortest_of(s)

@@ -9,7 +9,7 @@ import numpy as np
 
 from embodied.action_spaces import PanoramicMoves, doors_in
 from embodied.interface import VIEWS, Ask, Candidates, Episode, Label, Move, Open, Place, Pose, Situation, Step, Stop
-from embodied.navigation.graph import behind_doors, nearest
+from embodied.navigation.graph import OPENING, behind_doors, nearest
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
@@ -27,18 +27,27 @@ def shortest_action(
     targets: Sequence[int],
     candidate_nodes: Sequence[int],
     closed: frozenset[str] = frozenset(),
+    opening: float = OPENING,
 ) -> Move | Open | Stop:
-    """The reference action in the panoramic action space, by ways that open doors; stop at a target."""
-    node = next_node(behind_doors(graph, closed), pose.node, targets)
-    if node == pose.node:
+    """The reference action in the panoramic action space, by ways that open doors; stop at a target, or where no way
+    leads to one.
+
+    Args:
+      opening: metres that opening a door counts as; infinite for who opens none.
+    """
+    ways, here = behind_doors(graph, closed, opening), pose.node
+    target = nearest(ways, here, targets) if targets else here
+    if target == here or not np.isfinite(ways.distance[here, target]):
         return Stop()
+    node = int(ways.next_hop[here, target])
     chosen = candidate_nodes.index(node)
-    return Open(chosen) if graph.barred(pose.node, node, closed) else Move(chosen)
+    return Open(chosen) if graph.barred(here, node, closed) else Move(chosen)
 
 
-def shortest_of(s: Situation) -> Move | Open | Stop:
-    """The shortest path's action in a situation."""
-    return shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes, s.closed)
+def shortest_of(s: Situation, targets: Sequence[int] | None = None, opening: float = OPENING) -> Move | Open | Stop:
+    """The shortest path's action in a situation, towards its targets or others; `opening` as in `shortest_action`."""
+    targets = s.targets if targets is None else targets
+    return shortest_action(s.world.graph, s.pose, targets, s.candidate_nodes, s.closed, opening)
 
 
 class ShortestTeacher:
