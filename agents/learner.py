@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from embodied.agents.common.settings import SHIPPED_ENCODER
 from embodied.agents.vision.config import SAME_TIME
 from embodied.assets.cache import default_cache
-from embodied.kinds.plugins import record_named
+from embodied.kinds.plugins import Registry
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset, SplitData
@@ -80,27 +80,15 @@ class Learner:
     """Weights that come with the program."""
 
 
-_LEARNERS: dict[str, Learner] = {}
-
-
-def register_learner(learner: Learner) -> Learner:
-    """Make a learner known by its name; returns it. Call it where the learner is defined."""
-    _LEARNERS[learner.name] = learner
-    return learner
-
-
 def shipped_learners() -> list[str]:
     """Names of the learners that come with the program, without importing them: the files of agents/learners."""
     return sorted(f.stem for f in (Path(__file__).parent / "learners").glob("[!_]*.py"))
 
 
-def learner_named(name: str) -> Learner:
-    """The learner of a name: a registered or a shipped one, or 'module:NAME', whose module is imported.
-
-    Raises:
-      ValueError: unknown, or what 'module:NAME' names is no learner.
-    """
-    return record_named(name, _LEARNERS, Learner, "embodied.agents.learners", shipped_learners())
+LEARNERS = Registry(Learner, "embodied.agents.learners", shipped_learners)
+register_learner = LEARNERS.add
+"""Make a learner known by its name; returns it. Call it where the learner is defined."""
+learner_named = LEARNERS.named
 
 
 def playing_learner(kind: str) -> Learner | None:

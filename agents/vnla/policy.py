@@ -37,7 +37,7 @@ from embodied.interface import (
     Stop,
     Thought,
 )
-from embodied.policies.baselines import random_times
+from embodied.policies.baselines import asking_times
 from embodied.teachers.vnla import VnlaTeacher, ask_reason
 
 SURE = 0.6
@@ -168,10 +168,6 @@ class VnlaPolicy:
     ) -> VnlaMemory:
         """Memory before the first step of the episodes at `positions`."""
         k, device = len(positions), next(self.network.parameters()).device
-        drawn = [
-            random_times(s, rngs[p]) if self.asker == "random" and s is not None else frozenset()
-            for p, s in zip(positions, situations, strict=True)
-        ]
         return VnlaMemory(
             positions=positions,
             state=torch.zeros(k, 2, self.network.hidden_size, device=device),
@@ -179,7 +175,7 @@ class VnlaPolicy:
             previous_move=torch.full((k,), networks.NO_MOVE, device=device),
             previous_ask=torch.full((k,), networks.NO_ASK, device=device),
             before=(None,) * k,
-            times=tuple(drawn),
+            times=asking_times(self.asker, situations, [rngs[p] for p in positions]),
             request=torch.from_numpy(self.vocabulary.batch([o.instruction for o in seen], REQUEST)).to(device),
             read=torch.zeros(k, networks.READ, device=device),
             came=torch.full((k,), -1, device=device),

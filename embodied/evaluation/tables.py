@@ -15,7 +15,7 @@ from scipy.special import stdtrit
 from embodied.assets.cache import write_bytes
 from embodied.interface import Episode
 from embodied.kinds import metrics
-from embodied.kinds.task_kind import kind_named, known_kinds
+from embodied.kinds.task_kind import KINDS, kind_named
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
@@ -215,7 +215,7 @@ def row(agent: str, split: str, episodes: Sequence[Episode], graphs: Mapping[str
 
 def in_percent(name: str) -> bool:
     """True for a column that is shown in per cent."""
-    return name in PERCENT or any(name in k.metrics and k.metrics[name].percent for k in known_kinds())
+    return name in PERCENT or any(name in k.metrics and k.metrics[name].percent for k in KINDS.known.values())
 
 
 def shown(name: str, value: Estimate) -> str:

@@ -11,6 +11,7 @@ camera. Episodes are the tasks of a `vln` data set, or objects of the houses of 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
@@ -44,7 +45,7 @@ from embodied.gym.sensors import LARGE, among, check_live, live_pixels, pixel_sp
 from embodied.gym.spaces import codes_of, whole
 from embodied.gym.vector_env import in_step
 from embodied.kinds.metrics import warping
-from embodied.kinds.plugins import record_named, titled_files
+from embodied.kinds.plugins import Registry, titled_files
 from embodied.render.camera import camera_at
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import checked_seed
@@ -93,20 +94,16 @@ class ContinuousTask:
     """Observations have the goal: metres as the crow flies, and radians, left positive."""
 
 
-CONTINUOUS_TASKS: dict[str, ContinuousTask] = {}
+CONTINUOUS_TASKS = Registry(
+    ContinuousTask, "embodied.gym.continuous_tasks", functools.partial(titled_files, "gym/continuous_tasks")
+)
+continuous_task = CONTINUOUS_TASKS.named
 
 
 def register_continuous(task: ContinuousTask) -> ContinuousTask:
     """Make a task known by its name, and to Gymnasium as embodied/TITLE-v0; returns it. Call it where it is defined."""
-    CONTINUOUS_TASKS[task.name] = task
     register_environment(gym, task.title, task.name, __name__, __name__)
-    return task
-
-
-def continuous_task(name: str) -> ContinuousTask:
-    """The task of a name; raises ValueError where there is none."""
-    folder = "embodied.gym.continuous_tasks"
-    return record_named(name, CONTINUOUS_TASKS, ContinuousTask, folder, titled_files("gym/continuous_tasks"))
+    return CONTINUOUS_TASKS.add(task)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from embodied.geometry import wrap
 from embodied.gym.sensors import LARGE, PIXELS, among, check_live, live_pixels
 from embodied.gym.spaces import codes_of
 from embodied.interface import SuccessRule, Trajectory
-from embodied.kinds.plugins import record_named
+from embodied.kinds.plugins import Registry
 from embodied.language.plain_language import with_article
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.navigation.free_space import EYE
@@ -119,18 +119,9 @@ class DrivenTask:
     observation: Callable[[Driving], dict[str, np.ndarray]]
 
 
-DRIVEN_TASKS: dict[str, DrivenTask] = {}
-
-
-def register_driven(task: DrivenTask) -> DrivenTask:
-    """Make a task known by its name; returns it. Call it where the task is defined."""
-    DRIVEN_TASKS[task.name] = task
-    return task
-
-
-def driven_task(name: str) -> DrivenTask:
-    """The task of a name; raises ValueError where there is none."""
-    return record_named(name, DRIVEN_TASKS, DrivenTask, "", ())
+DRIVEN_TASKS = Registry(DrivenTask)
+register_driven, driven_task = DRIVEN_TASKS.add, DRIVEN_TASKS.named
+"""Make a task known; and the task of a name."""
 
 
 class Driving:

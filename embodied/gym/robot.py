@@ -23,7 +23,7 @@ from embodied.gym.drive import VIEW, LiveEnv, chosen_worlds
 from embodied.gym.driving import POINTS, TEXT
 from embodied.gym.sensors import LARGE, PIXELS, check_live, live_pixels, pixel_spaces
 from embodied.gym.spaces import codes_of
-from embodied.kinds.plugins import record_named
+from embodied.kinds.plugins import Registry
 from embodied.navigation.floor_ways import FloorWays
 from embodied.render.camera import camera_of
 from embodied.scene.doors import openness
@@ -95,18 +95,9 @@ class RobotTask:
     """Its environment; RobotEnv where not given."""
 
 
-ROBOT_TASKS: dict[str, RobotTask] = {}
-
-
-def register_robot_task(task: RobotTask) -> RobotTask:
-    """Make a task known by its name; returns it. Call it where the task is defined."""
-    ROBOT_TASKS[task.name] = task
-    return task
-
-
-def robot_task(name: str) -> RobotTask:
-    """The task of a name; raises ValueError where there is none."""
-    return record_named(name, ROBOT_TASKS, RobotTask, "embodied.gym", ("bring",))
+ROBOT_TASKS = Registry(RobotTask, "embodied.gym", lambda: ("bring",))
+register_robot_task, robot_task = ROBOT_TASKS.add, ROBOT_TASKS.named
+"""Make a task known; and the task of a name."""
 
 
 class RobotEnv(LiveEnv):

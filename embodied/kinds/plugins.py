@@ -8,12 +8,12 @@ import re
 import sys
 from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 if TYPE_CHECKING:
     from embodied.interface import Assistant
 
-T = TypeVar("T")
+T = TypeVar("T", bound=Any)
 
 
 @functools.cache
@@ -75,23 +75,36 @@ def named_object(name: str) -> Any:
         raise ValueError(f"expected 'module:NAME' with an importable module, got {name!r} ({e})") from e
 
 
-def record_named(name: str, records: dict[str, T], record: type[T], package: str, shipped: Collection[str]) -> T:
-    """The record of a name: in `records`, where a `shipped` module of `package` puts it, or what 'module:NAME' names.
+class Registry(Generic[T]):
+    """Records of a type by their names; those that come with the program are added by the modules of a package."""
 
-    Raises:
-      ValueError: unknown, or what 'module:NAME' names is no such record of that name.
-    """
-    if name not in records and name in shipped:
-        importlib.import_module(f"{package}.{name}")
-    elif name not in records and ":" in name:
-        made = named_object(name)
-        if not isinstance(made, record) or getattr(made, "name", None) != name:
-            raise ValueError(f"{name!r} should be a {record.__name__} with name={name!r}, got {made!r:.60}")
-        records[name] = made
-    if name not in records:
-        what, known = re.sub(r"\B([A-Z])", r" \1", record.__name__).lower(), sorted({*records, *shipped})
-        raise ValueError(f"unknown {what} {name!r}; use one of {known}, or 'module:NAME' of your own")
-    return records[name]
+    def __init__(self, kind: type[T], package: str = "", shipped: Callable[[], Collection[str]] = tuple) -> None:
+        """`shipped`: names of the modules of `package`, which are those of their records."""
+        self.known, self._kind, self._package, self._shipped = dict[str, T](), kind, package, shipped
+
+    def add(self, record: T) -> T:
+        """Make a record known by its name; returns it. Call it where the record is defined."""
+        self.known[record.name] = record
+        return record
+
+    def named(self, name: str) -> T:
+        """The record of a name: one that was added, a shipped one, or 'module:NAME', whose module is imported.
+
+        Raises:
+          ValueError: unknown, or what 'module:NAME' names is no such record of that name.
+        """
+        shipped = self._shipped()
+        if name not in self.known and name in shipped:
+            importlib.import_module(f"{self._package}.{name}")
+        elif name not in self.known and ":" in name:
+            made = named_object(name)
+            if not isinstance(made, self._kind) or getattr(made, "name", None) != name:
+                raise ValueError(f"{name!r} should be a {self._kind.__name__} with name={name!r}, got {made!r:.60}")
+            self.known[name] = made
+        if name not in self.known:
+            what, known = re.sub(r"\B([A-Z])", r" \1", self._kind.__name__).lower(), sorted({*self.known, *shipped})
+            raise ValueError(f"unknown {what} {name!r}; use one of {known}, or 'module:NAME' of your own")
+        return self.known[name]
 
 
 def made_by_name(name: str) -> Any:

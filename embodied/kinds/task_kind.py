@@ -27,7 +27,7 @@ from typing import Any, Literal
 from embodied import interface
 from embodied.action_spaces import PanoramicMoves
 from embodied.envs.base import HelpEnv
-from embodied.kinds.plugins import announce_kind, record_named, shipped_kinds
+from embodied.kinds.plugins import Registry, announce_kind, shipped_kinds
 from embodied.kinds.splits import Splits, SplitSizes, seen_and_unseen
 from embodied.navigation.graph import NavGraph
 from embodied.policies.baselines import Forward10, RandomWalk, Shortest
@@ -305,7 +305,8 @@ class TaskKind:
 
 # The registry -----------------------------------------------------------------------------------
 
-_KINDS: dict[str, TaskKind] = {}
+KINDS = Registry(TaskKind, "embodied.kinds.shipped", shipped_kinds)
+kind_named = KINDS.named
 
 
 def register_kind(kind: TaskKind) -> TaskKind:
@@ -317,19 +318,4 @@ def register_kind(kind: TaskKind) -> TaskKind:
       ValueError: its name does not say where it is found, or its title is another kind's.
     """
     announce_kind(kind.name, kind.title)
-    _KINDS[kind.name] = kind
-    return kind
-
-
-def known_kinds() -> list[TaskKind]:
-    """The kinds that were registered so far."""
-    return list(_KINDS.values())
-
-
-def kind_named(name: str) -> TaskKind:
-    """The kind of a name: one that was registered, a shipped one, or 'module:NAME', whose module is imported.
-
-    Raises:
-      ValueError: unknown, or what 'module:NAME' names is no kind of that name.
-    """
-    return record_named(name, _KINDS, TaskKind, "embodied.kinds.shipped", shipped_kinds())
+    return KINDS.add(kind)

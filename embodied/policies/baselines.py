@@ -231,10 +231,15 @@ def _taken(odds: dict[str, float], o: Observation, rng: np.random.Generator) -> 
     return Stop(thought) if choice == len(WORDS) else Move(choice, thought)
 
 
-def random_times(s: Situation, rng: np.random.Generator) -> frozenset[int]:
-    """When the asker 'random' asks, drawn at the beginning of an episode: as often as its budget allows."""
-    left = min(s.requests_left or 0, s.task.horizon)
-    return frozenset(int(t) for t in rng.choice(s.task.horizon, left, replace=False))
+def asking_times(asker: str, situations: Situations, rngs: Rngs) -> tuple[frozenset[int], ...]:
+    """When the asker 'random' asks, drawn at the beginning of each episode: as often as its budget allows."""
+
+    def drawn(s: Situation, rng: np.random.Generator) -> frozenset[int]:
+        left = min(s.requests_left or 0, s.task.horizon)
+        return frozenset(int(t) for t in rng.choice(s.task.horizon, left, replace=False))
+
+    random = asker == "random"
+    return tuple(drawn(s, rng) if random and s else frozenset() for s, rng in zip(situations, rngs, strict=True))
 
 
 class VnlaAsking:
@@ -253,7 +258,7 @@ class VnlaAsking:
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
-        times, inner = memory or (self._times(situations, rngs), None)
+        times, inner = memory or (asking_times(self._ask, situations, rngs), None)
         actions, inner = act(self._navigation, observations, situations, inner, rngs=rngs)
         for i, (o, s, planned) in enumerate(zip(observations, situations, actions, strict=True)):
             if o is None or s is None or planned is None:
@@ -261,10 +266,6 @@ class VnlaAsking:
             if o.can_ask and self._wants(s, planned, times[i]):
                 actions[i] = Ask(o.can_ask[0], planned.thought)
         return actions, (times, inner)
-
-    def _times(self, situations: Situations, rngs: Rngs) -> list[frozenset[int]]:
-        random = self._ask == "random"
-        return [random_times(s, rng) if random and s else frozenset() for s, rng in zip(situations, rngs, strict=True)]
 
     def _wants(self, s: Situation, planned: Action, times: frozenset[int]) -> bool:
         if self._ask == "teacher":
