@@ -114,7 +114,7 @@ def test_live_pictures_are_without_reflections_unless_they_are_named(named, tmp_
     house = furnished(two_rooms())
     monkeypatch.setattr(drive, "make_dataset_house", lambda *_: (house, None))
     monkeypatch.setattr(drive, "load_catalogue", lambda *_: HandCatalogue())
-    (flat,) = drive.flat_worlds(0, tmp_path, named).values()
+    (flat,) = drive.chosen_worlds(cache=tmp_path, pictures=named)[0].values()
     assert flat.pictures.word == (named or "fast-matte")
 
 

@@ -61,7 +61,7 @@ def test_a_policy_that_scores_the_experts_action_highest_succeeds(world):
 def test_the_hubs_file_makes_the_environment(world, tmp_path, monkeypatch):
     from embodied.gym import continuous
 
-    monkeypatch.setattr(continuous, "flat_worlds", lambda *_: {world.name: world})
+    monkeypatch.setattr(continuous, "chosen_worlds", lambda **_: ({world.name: world}, {}))
     hub_file(tmp_path / "env.py", "VLNCE", seed=4, **SMALL)
     spec = importlib.util.spec_from_file_location("hub_env", tmp_path / "env.py")
     module = importlib.util.module_from_spec(spec)

@@ -39,7 +39,8 @@ from embodied.envs.continuous import (
     social_measures,
 )
 from embodied.geometry import wrap
-from embodied.gym.drive import VIEW, LiveEnv, data_worlds, flat_worlds
+from embodied.gym.drive import chosen_worlds
+from embodied.gym.env import VIEW, LiveEnv
 from embodied.gym.registration import register_environment
 from embodied.gym.sensors import LARGE, among, check_live, live_pixels, pixel_spaces
 from embodied.gym.spaces import codes_of, whole
@@ -148,7 +149,7 @@ class ContinuousGymEnv(LiveEnv):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
 
     def __init__(self, dataset: EpisodeDataset, *, render_mode: str | None = None) -> None:
-        super().__init__(render_mode)
+        super().__init__(render_mode, dataset.opened.values())
         self.dataset = dataset
         self.play = ContinuousEnv(dataset.body, dataset.navmeshes)
         """The pose of the body, and what is privileged: distance, ways, the walk so far."""
@@ -234,11 +235,6 @@ class ContinuousGymEnv(LiveEnv):
         world = self.dataset.world(self.play.episode.world).with_doors(dict.fromkeys(self.play.pushed, 1.0))
         return among(world, self.play.crowd)
 
-    def close(self) -> None:
-        for world in self.dataset.opened.values():
-            world.close()
-        self.dataset.opened.clear()
-
     def _facts(self) -> dict[str, Any]:
         play = self.play
         state = {"distance_to_goal": play.distance, "collided": play.collided, "steps_taken": play.steps}
@@ -310,8 +306,7 @@ def open_episodes(
     body, camera = chosen(task, changes)
     where, navmeshes = Path(cache) if cache else default_cache(), NavMeshCache()
     whole = Dataset(Path(data)) if data is not None and worlds is None else None
-    if worlds is None:
-        worlds = data_worlds(Path(data), split, where, pictures) if data else flat_worlds(seed, where, pictures)
+    worlds, _ = chosen_worlds(data=data, split=split, seed=seed, cache=where, pictures=pictures, worlds=worlds)
     if episodes is None:
         played = task.episodes(EpisodeSource(worlds, whole, split, seed, where, navmeshes))
     elif task.read is None:

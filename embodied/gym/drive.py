@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
@@ -22,37 +21,12 @@ from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import Dataset
 from embodied.generate import HouseConfig
 from embodied.gym.driving import DriveSettings, Driving, driven_task
+from embodied.gym.env import VIEW, LiveEnv
 from embodied.gym.playground import FLAT_AREA, pictures_of
 from embodied.gym.sensors import LARGE, pixel_spaces
 from embodied.render.pictures import PictureSettings, matte
 from embodied.seeds import checked_seed
 from embodied.world import World, open_world
-
-VIEW = (480, 640)
-"""Height and width of what `render` shows, pixels."""
-
-
-class LiveEnv(gym.Env[dict[str, Any], Any]):
-    """An environment with live pictures. Subclasses define `_picture`, what people are shown."""
-
-    def __init__(self, render_mode: str | None) -> None:
-        """
-        Raises:
-          ValueError: an unknown render mode.
-        """
-        if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"render_mode should be 'rgb_array' or None, got {render_mode!r}")
-        self.render_mode = render_mode
-
-    def _picture(self) -> np.ndarray:
-        raise NotImplementedError
-
-    def render(self) -> np.ndarray | None:
-        """(*VIEW, 3) uint8: what its camera sees, larger."""
-        if self.render_mode is None:
-            gym.logger.warn("render() needs render_mode='rgb_array' when the environment is made")
-            return None
-        return self._picture()
 
 
 class DriveEnv(LiveEnv):
@@ -67,7 +41,7 @@ class DriveEnv(LiveEnv):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
 
     def __init__(self, driving: Driving, *, render_mode: str | None = None) -> None:
-        super().__init__(render_mode)
+        super().__init__(render_mode, driving.worlds.values())
         self.driving = driving
         self.action_space: spaces.Box = spaces.Box(-1.0, 1.0, (driving.settings.numbers,), np.float32)
         self.observation_space = spaces.Dict({**seen_space(driving.settings)})
@@ -91,9 +65,6 @@ class DriveEnv(LiveEnv):
 
     def _picture(self) -> np.ndarray:
         return self.driving.seen.renderer.rgb(self.driving.camera(), VIEW)
-
-    def close(self) -> None:
-        self.driving.close()
 
 
 def seen_space(s: DriveSettings) -> dict[str, spaces.Box]:
@@ -129,22 +100,15 @@ def chosen_worlds(
       pictures: how houses are drawn; as the data set's pictures are without reflections, 'fast-matte' elsewhere: every
         command is a picture of its own, and reflections take more than twice the time.
     """
+    if worlds is not None:
+        return worlds, others
     where = Path(cache) if cache else default_cache()
-    if worlds is None:
-        worlds = data_worlds(Path(data), split, where, pictures) if data else flat_worlds(seed, where, pictures)
-    return worlds, others
-
-
-def data_worlds(data: Path, split: str, cache: Path, pictures: PictureSettings | str | None) -> dict[str, World]:
-    """The houses of a split."""
-    whole, catalogue = Dataset(data), load_catalogue(cache)
-    names = whole.names(split)
-    drawn = pictures or matte(pictures_of(whole, names, wanted=False))
-    return {name: whole.open_world(name, catalogue, cache, drawn) for name in names}
-
-
-def flat_worlds(seed: int, cache: Path, pictures: PictureSettings | str | None) -> dict[str, World]:
-    """The flat that the other environments play in, too."""
-    name, catalogue = f"flat_{seed}", load_catalogue(cache)
+    catalogue = load_catalogue(where)
+    if data:
+        whole = Dataset(Path(data))
+        names = whole.names(split)
+        drawn = pictures or matte(pictures_of(whole, names, wanted=False))
+        return {name: whole.open_world(name, catalogue, where, drawn) for name in names}, others
+    name = f"flat_{seed}"
     house, graph = make_dataset_house(seed, name, HouseConfig(area=FLAT_AREA), catalogue)
-    return {name: open_world(house, catalogue, cache, pictures or "fast-matte", graph=graph)}
+    return {name: open_world(house, catalogue, where, pictures or "fast-matte", graph=graph)}, others

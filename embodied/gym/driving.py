@@ -264,11 +264,6 @@ class Driving:
         x, y, z = (float(v) for v in -axes[:, 2])
         return camera_at(position, math.atan2(y, x), math.asin(max(-1.0, min(1.0, z))), self.settings.vfov)
 
-    def close(self) -> None:
-        """Free what draws; a later use opens it again."""
-        for world in self.worlds.values():
-            world.close()
-
     def _draw(self, rng: np.random.Generator) -> int:
         """Choose goal and start, and the ways between; returns the start's cell."""
         s = self.settings

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import functools
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,7 +67,40 @@ VIEW_ANGLE = np.radians(78.0)
 """Vertical field of view of what `render` shows, radians: wider than the agent's 60 degrees; people need it."""
 
 
-class HelpGymEnv(gym.Env[dict[str, Any], Any]):
+class LiveEnv(gym.Env[dict[str, Any], Any]):
+    """An environment that draws. Subclasses define `_picture`, what people are shown."""
+
+    metadata = {"render_modes": ["rgb_array"]}
+
+    def __init__(self, render_mode: str | None, opened: Iterable[World]) -> None:
+        """
+        Args:
+          opened: worlds that `close` closes.
+
+        Raises:
+          ValueError: an unknown render mode.
+        """
+        check_options(render_mode)
+        self.render_mode, self._opened = render_mode, opened
+
+    def _picture(self) -> np.ndarray:
+        """(*VIEW, 3) uint8: what its camera sees, larger."""
+        raise NotImplementedError
+
+    def render(self) -> np.ndarray | None:
+        """What people are shown, (h, w, 3) uint8."""
+        if self.render_mode is None:
+            gym.logger.warn("render() needs render_mode='rgb_array' when the environment is made")
+            return None
+        return self._picture()
+
+    def close(self) -> None:
+        """Close what draws, and the files, of the worlds that were opened for this; a later use opens them again."""
+        for world in self._opened:
+            world.close()
+
+
+class HelpGymEnv(LiveEnv):
     """A HelpEnv as a Gymnasium environment: numbers in, numbers out, text as text.
 
     Reward: 1 on success at the end, minus 0.01 per step and the price of a question (Ask-v0); HARI: minus the cost
@@ -110,13 +143,13 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         Raises:
           ValueError: no tasks, an unknown render mode, or patience below 1.
         """
+        super().__init__(render_mode, opened)
         check_options(render_mode, patience=patience)
         if not tasks:
             raise ValueError("there are no tasks to play; choose another split or a larger scale")
         self._env, self._tasks, self._sensor, self._layout = make_env(), tuple(tasks), sensor, layout
         self._shaping, self._strict, self._patience = shaping, strict, patience
-        self._needs_stop, self._opened = needs_stop, tuple(opened)
-        self.render_mode = render_mode
+        self._needs_stop = needs_stop
         self.action_space: gym.Space[Any] = action_space(layout)
         self.observation_space = observation_space(layout, sensor)
 
@@ -177,17 +210,9 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         info |= self._env.facts() | self._words()
         return self._encoded(self._o), float(reward), ended == "stop", ended == "limit", info
 
-    def render(self) -> np.ndarray | None:
+    def _picture(self) -> np.ndarray:
         """(544, 1120, 3) uint8: the agent's view, the plan with its path, and what was said."""
-        if self.render_mode is None:
-            gym.logger.warn("render() needs render_mode='rgb_array' when the environment is made")
-            return None
         return picture(self._env, self._o)
-
-    def close(self) -> None:
-        """Close what draws, and the files, of the worlds that were opened for this; a later use opens them again."""
-        for world in self._opened:
-            world.close()
 
     @property
     def layout(self) -> SpaceLayout:
@@ -258,7 +283,7 @@ def check_options(render_mode: str | None, *, patience: int = 1, **others: bool)
     Raises:
       ValueError: says which.
     """
-    if render_mode not in (None, *HelpGymEnv.metadata["render_modes"]):
+    if render_mode not in (None, *LiveEnv.metadata["render_modes"]):
         raise ValueError(f"render_mode should be 'rgb_array' or None, got {render_mode!r}")
     if not isinstance(patience, (int, np.integer)) or patience < 1:
         raise ValueError(f"patience should be a whole number of at least 1, got {patience!r}")

@@ -19,8 +19,9 @@ import numpy as np
 from gymnasium import spaces
 
 from embodied.envs.robots import FETCHER, RobotBody
-from embodied.gym.drive import VIEW, LiveEnv, chosen_worlds
+from embodied.gym.drive import chosen_worlds
 from embodied.gym.driving import POINTS, TEXT
+from embodied.gym.env import VIEW, LiveEnv
 from embodied.gym.sensors import LARGE, PIXELS, check_live, live_pixels, pixel_spaces
 from embodied.gym.spaces import codes_of
 from embodied.kinds.plugins import Registry
@@ -115,7 +116,7 @@ class RobotEnv(LiveEnv):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
 
     def __init__(self, worlds: Mapping[str, World], settings: RobotSettings, render_mode: str | None = None) -> None:
-        super().__init__(render_mode)
+        super().__init__(render_mode, worlds.values())
         self.worlds, self.settings, self.task = dict(worlds), settings, robot_task(settings.task)
         self._bodies: dict[str, tuple[RobotBody, FloorWays]] = {}
         self._enter(min(self.worlds))
@@ -233,10 +234,6 @@ class RobotEnv(LiveEnv):
         """(n,) cells of a room within NEAR of a point."""
         close = np.linalg.norm(self.ground.xy - point[:2], axis=1) <= NEAR
         return np.flatnonzero(close & (self.ground.room_of_cell == room))
-
-    def close(self) -> None:
-        for world in self.worlds.values():
-            world.close()
 
 
 def some_thing(env: RobotEnv, rng: np.random.Generator) -> RobotGoal | None:

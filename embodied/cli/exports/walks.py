@@ -33,10 +33,10 @@ def run_walks(form: str, args: WalkOptions) -> None:
     from embodied.datasets.store import dataset_of
     from embodied.datasets.vlnce import export_walks
     from embodied.envs.continuous import CameraConfig
-    from embodied.gym.drive import data_worlds
+    from embodied.gym.drive import chosen_worlds
 
     data = dataset_of(args.data, "vln")
-    worlds = data_worlds(args.data, args.split, args.cache, None)
+    worlds, _ = chosen_worlds(data=args.data, split=args.split, cache=args.cache)
     walks = route_episodes(data.tasks(args.split), worlds)[: args.tasks]
     how: dict[str, Any] = {"action_noise": args.action_noise, "split": args.split, "depth": args.depth}
     how |= {"seed": data.config.seed, "camera": CameraConfig(args.width, args.width)}
