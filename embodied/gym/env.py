@@ -88,7 +88,7 @@ class LiveEnv(gym.Env[dict[str, Any], Any]):
         raise NotImplementedError
 
     def render(self) -> np.ndarray | None:
-        """What people are shown, (h, w, 3) uint8."""
+        """Picture for people, (h, w, 3) uint8."""
         if self.render_mode is None:
             gym.logger.warn("render() needs render_mode='rgb_array' when the environment is made")
             return None
