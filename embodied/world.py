@@ -26,6 +26,7 @@ from embodied.navigation.free_space import closed_doors
 from embodied.navigation.graph import NavGraph, build_graph
 from embodied.navigation.poses import FreePoses
 from embodied.people.day import day_of, seconds_of
+from embodied.records import differences
 from embodied.render.camera import View
 from embodied.render.classic import Renderer
 from embodied.render.panorama import VFOV36, Panorama
@@ -565,8 +566,8 @@ class World:
                 log.warning("%s", e)
                 return None
             wanted = self._made_of if "renderer" in self._ignore_fields else self.fingerprint
-            if others := differing(file.meta, wanted, self._ignore_fields):
-                log.warning("%s holds other pictures (%s); drawing again", self.path, others)
+            if others := differences(file.meta, wanted, self._ignore_fields):
+                log.warning("%s holds other pictures (%s); drawing again", self.path, ", ".join(others))
                 file.close()
                 return None
             self._file, self._refused = file, False
@@ -676,17 +677,6 @@ def open_folder(
     graph, pictures = build_graph(house), parse_pictures(pictures, size)
     file = folder / "panoramas.pano"
     return World(house, catalogue, graph, cache, pictures, file=file, ignore_fields=("renderer",))
-
-
-def differing(held: Mapping[str, object], wanted: Mapping[str, object], ignore_fields: Collection[str] = ()) -> str:
-    """Difference between what pictures were made of and what they should be made of: 'size 256 instead of 192'.
-
-    Args:
-      ignore_fields: what is not looked at.
-    """
-    names = sorted({*held, *wanted} - {*ignore_fields}, key=str)
-    facts = [(n, held.get(n), wanted.get(n)) for n in names if held.get(n) != wanted.get(n)]
-    return ", ".join(f"{n} {a!r} instead of {b!r}" for n, a, b in facts)
 
 
 def gloss_of(bake: Bake, *, detail: bool = True, moving: MovingHouse | None = None) -> Gloss:

@@ -27,7 +27,6 @@ from embodied.records import RecordError
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas
 from embodied.render.pictures import Baked, Unlit
-from embodied.world import differing
 
 pytestmark = pytest.mark.slow
 
@@ -259,9 +258,3 @@ def test_a_data_set_knows_how_the_panoramas_that_it_holds_were_drawn(tmp_path):
     ):
         write_panoramas(data.folder / "houses" / name / "panoramas.pano", [empty], usual | change)
         assert data.drawn_pictures(name) == pictures
-
-
-def test_a_warning_names_what_differs_between_pictures():
-    held = {"size": 256, "quality": "unlit", "house": "a"}
-    wanted = {"size": 192, "quality": "unlit", "house": "a", "code": "b"}
-    assert differing(held, wanted) == "code None instead of 'b', size 256 instead of 192"
