@@ -32,34 +32,67 @@ class Moves(Protocol):
     def at(self, world: interface.Place, pose: interface.Pose) -> Reach: ...
 
 
-class PanoramicMoves:
-    """Rotate towards a neighbouring node and go there (Fried et al. 2018, dissertation 4.2.2)."""
+class KnownMoves:
+    """Moves that are worked out once per pose, by `reach`."""
 
     def __init__(self) -> None:
-        self._reach: dict[tuple[str, int, int], Reach] = {}
+        self._known: dict[tuple[str, interface.Pose], Reach] = {}
 
     def at(self, world: interface.Place, pose: interface.Pose) -> Reach:
-        key = (world.house.name, pose.node, pose.turn)
-        if key not in self._reach:
-            self._reach[key] = panoramic_reach(world.graph, pose)
-        return self._reach[key]
+        key = world.house.name, pose
+        if key not in self._known:
+            self._known[key] = self.reach(world.graph, pose)
+        return self._known[key]
+
+    def reach(self, graph: NavGraph, pose: interface.Pose) -> Reach:
+        raise NotImplementedError
 
 
-class MonocularMoves:
+class PanoramicMoves(KnownMoves):
+    """Rotate towards a neighbouring node and go there (Fried et al. 2018, dissertation 4.2.2)."""
+
+    def reach(self, graph: NavGraph, pose: interface.Pose) -> Reach:
+        """Neighbours sorted by |bearing| from the agent's yaw (docs/sources.md, S2); the tilt does not matter."""
+        nodes, yaw, pitch = directions(graph, pose.node)
+        bearing = wrap(yaw - pose.yaw)
+        order = bearing_order(bearing, nodes)
+        view = nearest_views(yaw, pitch)[order]
+        angles = (bearing[order].astype(np.float32), pitch[order].astype(np.float32))
+        candidates = interface.Candidates(*angles, view, np.ones(len(nodes), dtype=bool))
+        poses = tuple(
+            interface.Pose(int(j), int(v) % interface.TURNS, int(v) // interface.TURNS - 1)
+            for j, v in zip(nodes[order], view)
+        )
+        return candidates, poses
+
+
+class MonocularMoves(KnownMoves):
     """Turn or tilt by 30 degrees, or go to the node nearest the middle of the view (VNLA).
 
     Differs from the authors' program, whose 'forward' prefers the next node of the optimal path
     even at test time (docs/sources.md, S44): here an action never depends on the goal.
     """
 
-    def __init__(self) -> None:
-        self._reach: dict[tuple[str, interface.Pose], Reach] = {}
-
-    def at(self, world: interface.Place, pose: interface.Pose) -> Reach:
-        key = (world.house.name, pose)
-        if key not in self._reach:
-            self._reach[key] = monocular_reach(world.graph, pose)
-        return self._reach[key]
+    def reach(self, graph: NavGraph, pose: interface.Pose) -> Reach:
+        """The five moves of WORDS; 'forward' keeps the camera's angles."""
+        ahead = node_ahead(graph, pose)
+        forward = pose if ahead is None else interface.Pose(ahead, pose.turn, pose.tilt)
+        up, down = min(pose.tilt + 1, 1), max(pose.tilt - 1, -1)
+        poses = (
+            forward,
+            interface.Pose(pose.node, (pose.turn + 1) % interface.TURNS, pose.tilt),
+            interface.Pose(pose.node, (pose.turn - 1) % interface.TURNS, pose.tilt),
+            interface.Pose(pose.node, pose.turn, up),
+            interface.Pose(pose.node, pose.turn, down),
+        )
+        candidates = interface.Candidates(
+            np.array([0.0, interface.STEP, -interface.STEP, 0.0, 0.0], dtype=np.float32),
+            np.array([p.pitch for p in poses], dtype=np.float32),
+            np.array([p.view for p in poses]),
+            np.array([ahead is not None, True, True, pose.tilt < 1, pose.tilt > -1]),
+            WORDS,
+        )
+        return candidates, poses
 
 
 def directions(graph: NavGraph, node: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -83,43 +116,6 @@ def bearing_order(bearing: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     return np.lexsort((nodes, np.round(np.abs(bearing), 9)))
 
 
-def panoramic_reach(graph: NavGraph, pose: interface.Pose) -> Reach:
-    """Neighbours sorted by |bearing| from the agent's yaw (docs/sources.md, S2); the tilt does not matter."""
-    nodes, yaw, pitch = directions(graph, pose.node)
-    bearing = wrap(yaw - pose.yaw)
-    order = bearing_order(bearing, nodes)
-    view = nearest_views(yaw, pitch)[order]
-    angles = (bearing[order].astype(np.float32), pitch[order].astype(np.float32))
-    candidates = interface.Candidates(*angles, view, np.ones(len(nodes), dtype=bool))
-    poses = tuple(
-        interface.Pose(int(j), int(v) % interface.TURNS, int(v) // interface.TURNS - 1)
-        for j, v in zip(nodes[order], view)
-    )
-    return candidates, poses
-
-
-def monocular_reach(graph: NavGraph, pose: interface.Pose) -> Reach:
-    """The five moves of WORDS; 'forward' keeps the camera's angles."""
-    ahead = node_ahead(graph, pose)
-    forward = pose if ahead is None else interface.Pose(ahead, pose.turn, pose.tilt)
-    up, down = min(pose.tilt + 1, 1), max(pose.tilt - 1, -1)
-    poses = (
-        forward,
-        interface.Pose(pose.node, (pose.turn + 1) % interface.TURNS, pose.tilt),
-        interface.Pose(pose.node, (pose.turn - 1) % interface.TURNS, pose.tilt),
-        interface.Pose(pose.node, pose.turn, up),
-        interface.Pose(pose.node, pose.turn, down),
-    )
-    candidates = interface.Candidates(
-        np.array([0.0, interface.STEP, -interface.STEP, 0.0, 0.0], dtype=np.float32),
-        np.array([pose.pitch, pose.pitch, pose.pitch, up * interface.STEP, down * interface.STEP], dtype=np.float32),
-        np.array([p.view for p in poses]),
-        np.array([ahead is not None, True, True, pose.tilt < 1, pose.tilt > -1]),
-        WORDS,
-    )
-    return candidates, poses
-
-
 def node_ahead(graph: NavGraph, pose: interface.Pose) -> int | None:
     """The neighbour nearest the middle of the view among those within FIELD sideways, if any."""
     nodes, yaw, pitch = directions(graph, pose.node)
@@ -129,14 +125,6 @@ def node_ahead(graph: NavGraph, pose: interface.Pose) -> int | None:
         return None
     offset = np.where(inside, np.round(np.hypot(bearing, pitch - pose.pitch), 9), np.inf)
     return int(nodes[int(np.argmin(offset))])
-
-
-def door_actions(o: interface.Observation) -> dict[str, interface.Action]:
-    """Opening and closing what can be opened and closed now, by the names that language models use."""
-    return {
-        **{f"open {k}": interface.Open(k) for k in o.can_open},
-        **{f"close {k}": interface.Close(k) for k in o.can_close},
-    }
 
 
 def doors_moved(step: interface.Step, graph: NavGraph, closed: frozenset[str]) -> frozenset[str]:

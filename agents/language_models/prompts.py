@@ -21,7 +21,6 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from embodied import interface
-from embodied.action_spaces import door_actions
 from embodied.agents.language_models.client import Message
 from embodied.agents.language_models.completions import object_schema
 from embodied.assets.json_file import read_text
@@ -69,7 +68,8 @@ def actions_by_name(o: interface.Observation) -> dict[str, interface.Action]:
     }
     return {
         **moves,
-        **door_actions(o),
+        **{f"open {k}": interface.Open(k) for k in o.can_open},
+        **{f"close {k}": interface.Close(k) for k in o.can_close},
         **{f"ask {i.value}": interface.Ask(i) for i in o.can_ask},
         "stop": interface.Stop(),
     }
