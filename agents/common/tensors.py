@@ -89,8 +89,14 @@ def _kept(value: Any, rows: list[int]) -> Any:
 
 
 def padded(rows: Sequence[Sequence[int] | np.ndarray]) -> Tensor:
-    """(B, longest) int64 of rows of whole numbers, zeros behind their ends."""
+    """(B, longest, ...) int64 of rows of whole numbers, zeros behind their ends."""
     return torch.nn.utils.rnn.pad_sequence([torch.as_tensor(r, dtype=torch.long) for r in rows], batch_first=True)
+
+
+def side_by_side(rows: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
+    """(B, longest, ...) of tensors of unequal length, zero behind their ends; and (B, longest) bool, what is there."""
+    out = torch.nn.utils.rnn.pad_sequence(list(rows), batch_first=True)
+    return out, torch.arange(out.shape[1]) < torch.tensor([len(r) for r in rows])[:, None]
 
 
 def hidden_channels(episodes: int, size: int, share: float, device: Any = None) -> Tensor | None:

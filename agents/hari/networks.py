@@ -4,13 +4,14 @@ HARI's agents on disk: the execution policy alone, or with the intention policy 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import torch
 from torch import Tensor, nn
 
+from embodied.agents.common.tensors import Rows
 from embodied.agents.common.weights import load_into, load_weights, save_weights, seeded
 from embodied.agents.hari.words import SIZES, FeatureWords, Inputs
 from embodied.agents.learners.hari import ExecutionConfig, IntentionConfig
@@ -25,7 +26,7 @@ SHOWN = 8
 
 
 @dataclass(frozen=True, eq=False)
-class EncodedDescriptions:
+class EncodedDescriptions(Rows):
     """B descriptions as the encoder reads them."""
 
     rows: Tensor
@@ -33,20 +34,9 @@ class EncodedDescriptions:
     present: Tensor
     """(B, M) bool: False for padding."""
 
-    def __getitem__(self, which: list[int]) -> EncodedDescriptions:
-        """Those of some of the B."""
-        return EncodedDescriptions(self.rows[which], self.present[which])
-
     def upto(self, width: int) -> EncodedDescriptions:
         """The same with no more than `width` rows, where the others are padding."""
         return EncodedDescriptions(self.rows[:, :width], self.present[:, :width])
-
-    @classmethod
-    def together(cls, alone: Sequence[Tensor]) -> EncodedDescriptions:
-        """B tensors (m, h) of different lengths m, padded to the longest."""
-        lengths = torch.tensor([len(r) for r in alone])
-        rows = nn.utils.rnn.pad_sequence(list(alone), batch_first=True)
-        return cls(rows, torch.arange(rows.shape[1]) < lengths[:, None])
 
 
 def transformer(size: int, layers: int, heads: int, dropout: float) -> nn.TransformerEncoder:

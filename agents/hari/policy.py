@@ -13,6 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from embodied.agents.common.tensors import side_by_side
 from embodied.agents.hari import networks
 from embodied.agents.hari.words import collate, percept
 from embodied.interface import (
@@ -113,7 +114,7 @@ def consider(reader: Reader, observations: Observations, memory: Belief | None) 
     goals = [reader("goal", o.extras.goal_descriptions[-1]) for o in seen]
     together = zip(states, goals, seen, strict=True)
     inputs = collate([percept(words, s.rows, g.rows, o.candidates, o.turn) for s, g, o in together])
-    state, goal = (networks.EncodedDescriptions.together([r.encoded for r in some]) for some in (states, goals))
+    state, goal = (networks.EncodedDescriptions(*side_by_side([r.encoded for r in some])) for some in (states, goals))
     belief, log_moves = network(memory.carried[rows], inputs, state, goal)
     return Considered(rows, belief, log_moves), memory
 

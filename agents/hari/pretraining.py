@@ -22,9 +22,10 @@ from torch import Tensor
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import session as sessions
+from embodied.agents.common.tensors import padded
 from embodied.agents.common.weights import Stateful
 from embodied.agents.hari.networks import EncodedDescriptions, Executor, save
-from embodied.agents.hari.words import collate, padded, percept
+from embodied.agents.hari.words import collate, percept
 from embodied.agents.learners.hari import ExecutionConfig
 from embodied.assistants.descriptions import Describer, dropped
 from embodied.interface import Description, Episode, FindObject, Move, Place, Pose, Task
@@ -125,7 +126,7 @@ def _play(
       beta: share of the steps that go where the shortest path goes instead.
     """
     stay, describer = executor.config.stay_fraction, source.describer
-    goals = executor.network.encode(torch.from_numpy(padded([executor.words.rows(w.goal, "goal") for w in walks])))
+    goals = executor.network.encode(padded([executor.words.rows(w.goal, "goal") for w in walks]))
     losses, right = [], []
 
     def describe(walk: ExecutionWalk) -> Description:
@@ -167,7 +168,7 @@ def _steps(
             percept(words, words.rows(describe(w), "state"), words.rows(w.goal, "goal"), candidates, w.pose.turn)
             for w, (candidates, _) in zip(going, reach, strict=True)
         ]
-        goal = None if goals is None else goals[alive]
+        goal = None if goals is None else goals.select(alive)
         new, log_moves = executor.network(beliefs[alive], collate(rows), goal=goal)
         beliefs = beliefs.index_put((torch.tensor(alive),), new)
         yield going, [poses for _, poses in reach], log_moves

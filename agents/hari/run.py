@@ -23,7 +23,7 @@ from torch import Tensor
 
 from embodied.agents.common.imitation import TaskSet
 from embodied.agents.common.session import Options, Progress, Session, descend, episode_seed, run, tasks_of_update
-from embodied.agents.common.tensors import Decisions, actor_loss, costs_to_go, critic_loss
+from embodied.agents.common.tensors import Decisions, actor_loss, costs_to_go, critic_loss, side_by_side
 from embodied.agents.common.weights import Stateful, checksum_of, load_into, weights_digest
 from embodied.agents.hari import networks
 from embodied.agents.hari.policy import Choice, policy_of
@@ -97,7 +97,8 @@ def train_step(run: IntentionRun, ground: TaskSet, update: int) -> dict[str, flo
     choices: list[Choice] = []
     run.policy.choices = choices
     episodes = play(ground.make_env, run.policy, tasks, seed=episode_seed(config.seed, update), batch=len(tasks))
-    costs, mask = padded([shaped_costs(e, ground.worlds[e.task.world].graph.hops) for e in episodes])
+    shaped = [torch.tensor(shaped_costs(e, ground.worlds[e.task.world].graph.hops)) for e in episodes]
+    costs, mask = side_by_side(shaped)  # (B, T)
     log_p, entropy = chosen(choices, len(tasks))
     decisions = Decisions(log_p, -values(run.critic, choices, len(tasks)), -costs_to_go(costs, mask), mask)
     descend(critic_loss(decisions), run.critic_optimizer, f"update {update}, critic", config.clip)
@@ -109,12 +110,6 @@ def train_step(run: IntentionRun, ground: TaskSet, update: int) -> dict[str, flo
         "critic": float(critic_loss(decisions).detach()),
         "entropy": float((entropy.detach() * mask).sum() / mask.sum()),
     }
-
-
-def padded(rows: Sequence[Sequence[float]]) -> tuple[Tensor, Tensor]:
-    """(B, T) float32 of rows of unequal length, zero behind their ends, and (B, T) bool: where there is something."""
-    out = torch.nn.utils.rnn.pad_sequence([torch.tensor(r) for r in rows], batch_first=True)
-    return out, torch.arange(out.shape[1]) < torch.tensor([len(r) for r in rows])[:, None]
 
 
 def chosen(choices: Sequence[Choice], batch: int) -> tuple[Tensor, Tensor]:

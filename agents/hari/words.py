@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from embodied.agents.common.tensors import padded
 from embodied.interface import STEP, TURNS, Candidates, Description, Feature
 
 TYPES = ("object", "room", "action", "state", "goal")
@@ -114,17 +115,11 @@ def percept(words: FeatureWords, state: np.ndarray, goal: np.ndarray, candidates
 def collate(percepts: Sequence[PerceptRows]) -> Inputs:
     """Percepts of B agents side by side, padded; stopping moves to the last column of all."""
     most = max(len(p.moves) for p in percepts)
-    state, goal = padded([p.state for p in percepts]), padded([p.goal for p in percepts])
+    state, goal = padded([p.state for p in percepts]).numpy(), padded([p.goal for p in percepts]).numpy()
     named = (state[:, :, None, 0] == goal[:, None, :, 0]) & (goal[:, None, :, 0] > UNKNOWN)  # (B, S, G)
     same = named.astype(np.int64) + (named & (state[:, :, None] == goal[:, None]).all(-1))
     stacked = lambda name: np.stack([_stop_last(getattr(p, name), most) for p in percepts])
     return Inputs(state, goal, stacked("moves"), stacked("angles"), stacked("allowed"), same.max(2), same.max(1))
-
-
-def padded(rows: Sequence[np.ndarray]) -> np.ndarray:
-    """(B, M, 5) of B descriptions of up to M rows, zeros behind their ends."""
-    longest = max(map(len, rows))
-    return np.stack([np.pad(r, ((0, longest - len(r)), (0, 0))) for r in rows])
 
 
 def _stop_last(rows: np.ndarray, most: int) -> np.ndarray:
