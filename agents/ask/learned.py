@@ -168,7 +168,6 @@ def carried_out(choice: Choice, s: Situation, o: Observation, trail: EpisodeMemo
         return Stop()
     if isinstance(choice, Intention):
         return trail.ask(choice, reached(o))
-    trail.visits[s.pose.node] = trail.visits.get(s.pose.node, 0) + 1
     return onward(o, s, trail, rng)
 
 

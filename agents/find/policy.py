@@ -17,7 +17,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from embodied.agents.common.tensors import Chooser, choose_greedily, padded
+from embodied.agents.common.tensors import Chooser, choose_greedily, padded, side_by_side
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.find.network import SeekNetwork
 from embodied.agents.hanna.topological_map import SAME_PLACE, matches
@@ -303,7 +303,7 @@ def imitation_loss(scorer: SeekNetwork, searches: Sequence[Search]) -> tuple[Ten
     cases = [(begin, d) for begin, s in zip(first, searches) for d in s.decisions]
     rows = padded([d.options[:, 0] + begin for begin, d in cases])
     columns = padded([d.options[:, 1] % flat.shape[1] for _, d in cases])
-    facts_of = torch.nn.utils.rnn.pad_sequence([torch.from_numpy(d.facts) for _, d in cases], True)
+    facts_of, _ = side_by_side([torch.from_numpy(d.facts) for _, d in cases])
     decided, right = entropy(flat[rows, columns] + scorer.price(facts_of)[..., 0], [d.wanted for _, d in cases])
     return loss + decided, right
 
@@ -311,7 +311,6 @@ def imitation_loss(scorer: SeekNetwork, searches: Sequence[Search]) -> tuple[Ten
 def entropy(logits: Tensor, goals: Sequence[np.ndarray]) -> tuple[Tensor, Tensor]:
     """Mean cross-entropy of (N, M) logits with distributions over the first of them, and how often the likeliest is
     the same."""
-    goal = torch.nn.utils.rnn.pad_sequence([torch.from_numpy(g) for g in goals], True)
-    there = torch.arange(goal.shape[1]) < torch.tensor([len(g) for g in goals])[:, None]
+    goal, there = side_by_side([torch.from_numpy(g) for g in goals])
     logs = logits[:, : goal.shape[1]].masked_fill(~there, -1e4).log_softmax(-1)
     return -(goal * logs).sum(-1).mean(), (logs.argmax(-1) == goal.argmax(-1)).float().mean()

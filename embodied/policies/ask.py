@@ -67,7 +67,6 @@ class Asker(PerEpisodePolicy):
             return memory.ask(action.intention, reached(o))
         if isinstance(action, Stop):
             return action
-        memory.visits[s.pose.node] = memory.visits.get(s.pose.node, 0) + 1
         return onward(o, s, memory, rng)
 
 
@@ -78,7 +77,9 @@ def reached(o: Observation) -> Detection | None:
 
 
 def onward(o: Observation, s: Situation, trail: EpisodeMemory, rng: np.random.Generator) -> Action:
-    """Along the route that is shown, else towards what looks like the thing, else where it has been least."""
+    """Notes the visit, and goes on: along the route that is shown, else towards what looks like the thing, else where
+    it has been least."""
+    trail.visits[s.pose.node] = trail.visits.get(s.pose.node, 0) + 1
     if o.extras.advised is not None:
         return o.extras.advised
     visits = np.array([trail.visits.get(v, 0) for v in s.candidate_nodes])
@@ -175,7 +176,6 @@ class CollectThenSplit(Asker):
         if o.time < COLLECT * s.task.horizon:
             if likely and not pool.keys() & {here, *s.candidate_nodes}:
                 pool[here] = next((f.name for f in o.extras.state_description if f.kind == "room"), "")
-            memory.visits[here] = memory.visits.get(here, 0) + 1
             return onward(o, s, memory, rng)
         question = Intention.REGION if len({*pool.values()}) > 1 else Intention.APPEARANCE
         if len(pool) > 1 and question in o.can_ask and not memory.asked:
