@@ -21,10 +21,8 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from embodied.agents.common.tensors import Rows
-from embodied.interface import Move, Observation, Open, Stop
+from embodied.interface import VIEWS, Move, Observation, Open, Stop
 
-VIEWS = 36
-HEADINGS = 12
 SLOTS = VIEWS + 1
 """Static places of the navigation distribution: one per view relative to the agent, and stop (last)."""
 COPIES = 32

@@ -12,9 +12,10 @@ import torch
 from torch import Tensor, nn
 
 from embodied.agents.common.tensors import Rows
-from embodied.agents.hanna.attention import SLOTS, VIEWS, DotAttend, Percept, action_size
+from embodied.agents.hanna.attention import SLOTS, DotAttend, Percept, action_size
 from embodied.agents.hanna.network import AgentNetwork
 from embodied.agents.learners.hanna import TrainingConfig
+from embodied.interface import VIEWS
 
 
 @dataclass(frozen=True, eq=False)

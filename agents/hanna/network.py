@@ -25,7 +25,6 @@ from embodied.agents.common.tensors import Rows
 from embodied.agents.hanna.attention import (
     REQUEST,
     SLOTS,
-    VIEWS,
     DotAttend,
     FeedForward,
     IncTime,
@@ -39,6 +38,7 @@ from embodied.agents.hanna.attention import (
     target_similarity,
 )
 from embodied.agents.learners.hanna import TrainingConfig
+from embodied.interface import VIEWS
 
 SHORT = 12
 """Words up to which an instruction is encoded with the short ones."""

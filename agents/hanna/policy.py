@@ -146,7 +146,7 @@ class HannaPolicy:
         views, angles, mask = attention.candidate_rows(observations)
         k, most = views.shape
         turns = np.array([o.turn for o in observations])[:, None]  # (k, 1)
-        slots = views // attention.HEADINGS * attention.HEADINGS + (views - turns) % attention.HEADINGS
+        slots = views // interface.TURNS * interface.TURNS + (views - turns) % interface.TURNS
         slots[:, 0] = attention.SLOTS - 1
 
         device = next(self.network.parameters()).device
@@ -162,8 +162,8 @@ class HannaPolicy:
         actions = torch.cat([looks, facing], -1) * (exists & send(mask)[..., None])
         # The authors' program keeps rows of views absolute (docs/sources.md, S29), which tells the agent where east is;
         # D.1 leaves the order open, a robot has no compass: they begin at the agent's own heading.
-        absolute = np.arange(attention.VIEWS)[None]
-        order = absolute // attention.HEADINGS * attention.HEADINGS + (absolute + turns) % attention.HEADINGS  # (k, 36)
+        absolute = np.arange(interface.VIEWS)[None]
+        order = absolute // interface.TURNS * interface.TURNS + (absolute + turns) % interface.TURNS  # (k, 36)
         current, target = current[rows, send(order)], target[rows, send(order)]
         return attention.Percept(
             tokens=send(np.stack([self.encode(o) for o in observations])),

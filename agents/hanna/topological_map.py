@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from embodied.agents.hanna.attention import HEADINGS, VIEWS, action_index
+from embodied.agents.hanna.attention import action_index
 from embodied.agents.hanna.policy import HannaMemory, HannaPolicy, Steering
-from embodied.interface import Action, Actions, Mode, Move, Observation, Observations, Rngs, Situations
+from embodied.interface import TURNS, VIEWS, Action, Actions, Mode, Move, Observation, Observations, Rngs, Situations
 from embodied.policies.baselines import fewest_moves
 from embodied.teachers.shortest import shortest_of
 
@@ -90,8 +90,8 @@ def matches(picture: np.ndarray, panoramas: np.ndarray, mean: np.ndarray, *, tur
     if not len(shown):
         return np.zeros(len(panoramas), np.float32)
     cosines = _unit(picture[shown], mean) @ _unit(panoramas, mean).transpose(0, 2, 1)  # (k, shown, 36)
-    turns = np.arange(HEADINGS if turned else 1)[:, None]
-    columns = shown // HEADINGS * HEADINGS + (shown + turns) % HEADINGS  # (12, shown)
+    turns = np.arange(TURNS if turned else 1)[:, None]
+    columns = shown // TURNS * TURNS + (shown + turns) % TURNS  # (12, shown)
     return cosines[:, np.arange(len(shown)), columns].mean(-1).max(-1)
 
 
@@ -232,8 +232,8 @@ def weigh_by_image(
 
 def opposite(view: int) -> int:
     """The view behind: half a turn on, and as far below the horizon as the other is above."""
-    turn, tilt = view % HEADINGS, view // HEADINGS
-    return (turn + HEADINGS // 2) % HEADINGS + (VIEWS // HEADINGS - 1 - tilt) * HEADINGS
+    turn, tilt = view % TURNS, view // TURNS
+    return (turn + TURNS // 2) % TURNS + (VIEWS // TURNS - 1 - tilt) * TURNS
 
 
 @dataclass(frozen=True, eq=False)
