@@ -216,7 +216,7 @@ class HariStudy(EpisodeStudy):
         walking = self._walking(folder)
         begin = weights_digest(walking) if walking.exists() else None
         data = dataset_of(self.data, "hari").digest
-        return identity_of(type(self).__module__, settings=self.settings(train, seed), data=data, begin=begin)
+        return identity_of(*self.makers, settings=self.settings(train, seed), data=data, begin=begin)
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Train the execution policy that intention policies use."""

@@ -46,9 +46,15 @@ class StudyLearner:
     """Of PyTorch, per run."""
 
     @property
+    def makers(self) -> tuple[str, ...]:
+        """Modules that decide what is trained: the learner's, if it is one of ours."""
+        module = type(self).__module__
+        return (module,) if module.startswith("embodied.") else ()
+
+    @property
     def judges(self) -> tuple[str, ...]:
         """Modules that decide how it is judged."""
-        return (type(self).__module__,)
+        return self.makers
 
     @property
     def name(self) -> str:

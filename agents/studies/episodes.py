@@ -41,7 +41,7 @@ class EpisodeStudy(StudyLearner):
 
     @property
     def judges(self) -> tuple[str, ...]:
-        return (*JUDGES, type(self).__module__)
+        return (*JUDGES, *self.makers)
 
     # What a learner says ------------------------------------------------------------------------
 
@@ -78,7 +78,7 @@ class EpisodeStudy(StudyLearner):
     # What the engine asks -----------------------------------------------------------------------
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Identity:
-        return identity_of(type(self).__module__, settings=self.settings(train, seed), **self.depends(train))
+        return identity_of(*self.makers, settings=self.settings(train, seed), **self.depends(train))
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return {"data": self.judged_in(row.judge).digest, "tasks": self.tasks, "judging": self.eval_seeds}
