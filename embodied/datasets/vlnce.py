@@ -8,7 +8,7 @@ A walk may leave the expert's way: what is written as the action is always what 
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,7 +86,7 @@ def export_walks(
     form: str,
     folder: Path,
     episodes: Iterable[ContinuousEpisode],
-    worlds: dict[str, World],
+    worlds: Mapping[str, World],
     *,
     seed: int,
     camera: CameraConfig = SQUARE,
