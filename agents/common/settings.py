@@ -105,6 +105,16 @@ class ImitationSettings(ValidatedRunSettings):
     """Dropout rate in training, of features and hidden units."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class SightedSettings(ImitationSettings):
+    """Of agents that learn in a data set of tasks, as SightedLearner trains them."""
+
+    start: str = ""
+    """Weights of such an agent to start from, with its words: a file, or 'shipped'."""
+    closed_doors: Share = 0.0
+    """Close each door with this probability at the start of every training task; moves open doors and go through."""
+
+
 def scales(kind: type[C], name: str) -> Mapping[str, C]:
     """Settings by --scale, as scales.toml beside this file has them under a name; the defaults are the paper's."""
     changes = {"paper": {}, **read_toml(Path(__file__).with_name("scales.toml"))[name]}

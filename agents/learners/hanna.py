@@ -87,7 +87,7 @@ MODELS = ("hanna", "lstm")
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainingConfig(settings.ImitationSettings):
+class TrainingConfig(settings.SightedSettings):
     """The defaults are Table D.1; HANNA_SCALES holds the smaller settings."""
 
     model: Annotated[str, Option(words=MODELS)] = "hanna"

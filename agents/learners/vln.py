@@ -22,7 +22,7 @@ then more and more its own (Ross et al. 2011). The label is always the teacher's
 
 
 @dataclass(frozen=True, kw_only=True)
-class FollowerSettings(settings.ImitationSettings):
+class FollowerSettings(settings.SightedSettings):
     """How a follower is trained."""
 
     hidden_size: settings.AtLeastOne = 512

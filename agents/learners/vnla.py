@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class VnlaSettings(settings.ImitationSettings):
+class VnlaSettings(settings.SightedSettings):
     """The defaults are the program's; VNLA_SCALES holds smaller ones."""
 
     hidden_size: settings.AtLeastOne = 512

@@ -121,6 +121,7 @@ class FeatureBank:
         self._rows = SightRows(worlds)
         self._table = torch.from_numpy(self._rows.filled(worlds))
         self._shown: int | None = None
+        self._first = len(self._table)
         self._live, self._other_doors = live, dict[Viewpoint, int]()
         self.size, self.digest = self._rows.size, digest
 
@@ -134,7 +135,8 @@ class FeatureBank:
         if SightRows(pictures).spans != self._rows.spans or SightRows(pictures).size != self._rows.size:
             raise ValueError("pictures must be of the same worlds, with as many nodes and features")
         table = torch.from_numpy(self._rows.filled(pictures)).to(self._table.device)
-        return self._with(_table=torch.cat([self._table, table]), _shown=len(self._table))
+        both = torch.cat([self._table, table])
+        return self._with(_table=both, _shown=len(self._table), _first=len(both))
 
     def blind(self) -> FeatureBank:
         """The bank in which everything is black: all features are zero."""
@@ -160,9 +162,10 @@ class FeatureBank:
         at = viewpoint(sight)
         if at.world not in self._rows.spans and self._live is not None:
             if at not in self._other_doors:
-                self._other_doors[at] = len(self._table)
-                made = torch.from_numpy(self._live(sight)).to(self._table)
-                self._table = torch.cat([self._table, made[None]])
+                row = self._other_doors[at] = self._first + len(self._other_doors)
+                if row >= len(self._table):  # twice as many: copied seldom
+                    self._table = torch.cat([self._table, torch.zeros_like(self._table)])
+                self._table[row] = torch.from_numpy(self._live(sight)).to(self._table)
             return self._other_doors[at]
         row = self._rows.row(sight)
         if self._shown is not None and is_picture(sight):

@@ -15,7 +15,8 @@ from embodied.agents.common.imitation import About, SightedAgent, TaskSet
 from embodied.agents.common.session import Note, Options, Progress
 from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
 from embodied.agents.common.vocabulary import Vocabulary
-from embodied.agents.learner import PlaySettings
+from embodied.agents.common.weights import load_into
+from embodied.agents.learner import PlaySettings, learner_named
 from embodied.agents.studies.episodes import EpisodeStudy
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.vision.config import SAME_TIME
@@ -25,8 +26,9 @@ from embodied.agents.vision.live import LiveFeatures
 from embodied.agents.vision.run import drawings_of, drawn_world, house_features, pictures_of
 from embodied.assets.cache import default_cache
 from embodied.datasets.store import Dataset, dataset_of
+from embodied.envs.base import DoorRule
 from embodied.evaluation.evaluate import agent as agent_without_learning
-from embodied.evaluation.evaluate import spread
+from embodied.evaluation.evaluate import spread, with_doors
 from embodied.gym.sensors import PanoramaStore
 from embodied.interface import Agent
 from embodied.records import identity_of
@@ -131,8 +133,15 @@ class SightedLearner(imitation.ImitationLearner):
     ) -> Progress:
         """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
         training, validation = cls.splits(source, config)
-        words = cls.words_of(source.data, training)
+        if config.closed_doors:
+            training = with_doors(training, config.closed_doors, DoorRule.WALK, seed=config.seed)
+        file = learner_named(cls.agent_kind.kind).shipped if config.start == "shipped" else Path(config.start)
+        assert file, "such agents ship"
+        start = cls.agent_kind.load(file) if config.start else None
+        words = start.vocabulary if start else cls.words_of(source.data, training)
         agent = cls.agent_kind.new(source.about(cls.agent_kind.about_kind, config, evaluation, words))
+        if start:
+            load_into(agent.network, start.network.state_dict(), file)
         agent.network.to(source.device)
         identity = identity_of(cls.__module__, settings=config, **source.identity())
         return imitation.train(cls(agent, training), validation, folder, identity, **options)

@@ -151,24 +151,20 @@ class Evaluation:
     def changed(self, split: SplitData) -> SplitData:
         """The split with this assistant, these doors, this moment of asking and episodes of at most --steps."""
         from embodied.envs.base import DoorRule
-        from embodied.evaluation.evaluate import late_env
-        from embodied.tasks.goals import with_closed_doors
+        from embodied.evaluation.evaluate import late_env, with_doors
 
         if steps := self.args.steps:
             tasks = tuple(dataclasses.replace(t, horizon=min(t.horizon, steps)) for t in split.tasks)
             split = dataclasses.replace(split, tasks=tasks)
-        if share := self.args.closed_doors:
-            shut = (with_closed_doors(t, split.worlds[t.world], share, seed=self.args.seed) for t in split.tasks)
-            split = dataclasses.replace(split, tasks=tuple(shut))
+        split = with_doors(split, self.args.closed_doors, DoorRule(self.args.doors), seed=self.args.seed)
 
         def make_env() -> HelpEnv:
             env = split.make_env()
-            env.doors = DoorRule(self.args.doors)
             if env.assistant is not None and self.args.assistant != TEMPLATE:
                 env.assistant = self.reword(env.assistant)
             return env
 
-        usual = self.args.assistant == TEMPLATE and self.args.doors == DoorRule.OPEN.value and not self.args.ask_after
+        usual = self.args.assistant == TEMPLATE and not self.args.ask_after
         late = functools.partial(late_env, make_env, self.args.ask_after)
         return split if usual else dataclasses.replace(split, make_env=late)
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import itertools
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from embodied.envs.base import HelpEnv
+from embodied.envs.base import DoorRule, HelpEnv
 from embodied.evaluation.tables import Row, row
 from embodied.interface import (
     Agent,
@@ -30,9 +31,14 @@ from embodied.interface import (
 from embodied.kinds.plugins import made_by_name
 from embodied.kinds.task_kind import kind_named
 from embodied.seeds import stream
+from embodied.tasks.goals import with_closed_doors
 
 if TYPE_CHECKING:
     from embodied.datasets.store import SplitData
+
+
+S = TypeVar("S", bound=Any)
+"""A record with worlds, tasks and make_env."""
 
 
 def agent(kind: str, name: str, worlds: Mapping[str, SeenPlace] | None = None) -> Agent:
@@ -55,6 +61,18 @@ def spread(tasks: Sequence[Task], limit: int | None) -> list[Task]:
     longest = max(map(len, by_house.values()), default=0)
     order = [ts[i] for i in range(longest) for ts in by_house.values() if i < len(ts)]
     return order[:limit]
+
+
+def with_doors(split: S, share: float, rule: DoorRule, *, seed: int) -> S:
+    """A split in which this share of the doors is closed at the start of every task, and what moves towards them do."""
+
+    def make_env() -> HelpEnv:
+        env = split.make_env()
+        env.doors = rule
+        return env
+
+    closed = lambda t: with_closed_doors(t, split.worlds[t.world], share, seed=seed) if share else t
+    return dataclasses.replace(split, tasks=tuple(map(closed, split.tasks)), make_env=make_env)
 
 
 def evaluate(
