@@ -127,10 +127,17 @@ def doorway(house: House, opening: Opening) -> shapely.Polygon:
     return shapely.Polygon([a - half, b - half, b + half, a + half])
 
 
+def between_walls(house: House, storeys: Collection[int]) -> shapely.Geometry:
+    """Floors, with what stairs cover and where they leave them open, and doorways of some storeys."""
+    rooms = [r for r in house.rooms if r.storey in storeys]
+    return shapely.union_all([*map(house.floor, rooms), *_doorways(house, rooms)])
+
+
 def _floors_and_doorways(house: House, storey: int) -> shapely.Geometry:
-    rooms: list[Room] = [r for r in house.rooms if r.storey == storey]
-    ids = {r.id for r in rooms}
-    ways = [
-        doorway(house, o) for o in house.openings if o.kind in DOORS and o.rooms[1] is not None and o.rooms[0] in ids
-    ]
-    return shapely.union_all([*(open_floor(house, r) for r in rooms), *ways])
+    rooms = [r for r in house.rooms if r.storey == storey]
+    return shapely.union_all([*(open_floor(house, r) for r in rooms), *_doorways(house, rooms)])
+
+
+def _doorways(house: House, rooms: Collection[Room]) -> list[shapely.Polygon]:
+    ids, inside = {r.id for r in rooms}, [o for o in house.openings if o.kind in DOORS and o.rooms[1] is not None]
+    return [doorway(house, o) for o in inside if o.rooms[0] in ids]
