@@ -17,7 +17,7 @@ from embodied.interface import Close, Episode, FindObject, FollowRoute, Move, Op
 from embodied.kinds import metrics
 from embodied.kinds.task_kind import EnvInputs, kind_named
 from embodied.language import People
-from embodied.navigation.doors import place_named
+from embodied.navigation.doors import doors_in_sight, place_named
 from embodied.navigation.graph import OPENING, behind_doors, build_graph
 from embodied.policies.listeners import ScriptedListener
 from embodied.records import from_json, to_json
@@ -131,6 +131,15 @@ def test_a_renderer_that_turns_doors_draws_what_a_new_one_draws(world):
             turned, fresh = world.with_doors(shut).panorama(node), anew.panorama(node)
             assert np.array_equal(turned.ids, fresh.ids) and np.array_equal(turned.rgb, fresh.rgb)
     assert not np.array_equal(world.panorama(0).ids, world.with_doors(shut).panorama(0).ids)
+
+
+def test_a_door_that_changes_a_picture_is_in_sight(world):
+    shut, node_sees = world.with_doors({"door_1": 0.0}), doors_in_sight(HOUSE, world.graph)[:, 0]
+    nodes = range(len(world.graph.ids))
+    changed = [not np.array_equal(world.panorama(n).ids, shut.panorama(n).ids) for n in nodes]
+    assert all(node_sees[changed]) and any(changed)
+    walled = dataclasses.replace(world.graph, positions=world.graph.positions + [0, 100, 0])
+    assert not doors_in_sight(HOUSE, walled).any()
 
 
 def test_whoever_is_told_to_open_doors_arrives(world, task):

@@ -9,6 +9,7 @@ import json
 import math
 import os
 import signal
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -391,6 +392,22 @@ def test_a_run_writes_what_a_researcher_looks_at_and_ends_the_same_where_it_was_
         assert torch.equal(value, resumed.network.state_dict()[name]), name
     a, b = (validations_of(tmp_path / d) for d in ("straight", "broken"))
     assert a == b and {name for _, name, _ in a} >= {"success", "spl"}
+
+
+def test_training_starts_from_given_weights_and_keeps_their_words(tmp_path):
+    run(tmp_path / "first", dataclasses.replace(TINY, iterations=2))
+    file = tmp_path / "first" / "best.safetensors"
+    before = HannaAgent.load(file)
+    about = lambda kind, config, evaluation, words: kind(
+        config=config, evaluation=evaluation, encoder="tests", feature_size=16, words=words.words
+    )
+    source = SimpleNamespace(split=lambda name, **_: setting(), device="cpu", identity=dict, about=about)
+    config = dataclasses.replace(TINY, start=str(file), iterations=1, learning_rate=1e-9)
+    HannaLearner.train(source, config, JUDGED, tmp_path / "second", note=lambda line: None)
+    after = HannaAgent.load(tmp_path / "second" / "best.safetensors")
+    assert after.about.words == before.about.words
+    for name, value in before.network.state_dict().items():
+        assert torch.allclose(value, after.network.state_dict()[name], atol=1e-6), name
 
 
 def test_of_agents_as_good_as_each_other_the_later_is_kept():
