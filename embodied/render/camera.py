@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 
 NEAR_PLANE, FAR_PLANE = 0.03, 200.0
 """Nothing nearer or farther is drawn, metres."""
+Position = Sequence[float] | np.ndarray
+"""x, y, z, metres."""
+Planes = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Pixels of one picture or of several: rgb, depth and ids, as `View` has them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +51,7 @@ class Camera:
         return np.array([b * z - c * y, c * x - a * z, a * y - b * x])
 
 
-def camera_at(
-    position: Sequence[float] | np.ndarray, yaw: float, pitch: float = 0.0, vfov: float = math.pi / 2
-) -> Camera:
+def camera_at(position: Position, yaw: float, pitch: float = 0.0, vfov: float = math.pi / 2) -> Camera:
     """The camera that looks along (yaw, pitch), upright. Radians; yaw ccw from +x, pitch up."""
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
     return Camera(_point(position), (cy * cp, sy * cp, sp), (-cy * sp, -sy * sp, cp), vfov)
@@ -62,12 +64,12 @@ def camera_of(model: mujoco.MjModel, data: mujoco.MjData, name: str | int) -> Ca
     return Camera(_point(data.cam_xpos[camera]), _point(-back), _point(up), math.radians(model.cam_fovy[camera]))
 
 
-def face_cameras(position: Sequence[float] | np.ndarray) -> list[Camera]:
+def face_cameras(position: Position) -> list[Camera]:
     """The cameras of the six cube faces, in the order of panorama.FACES."""
     at = _point(position)
     return [Camera(at, forward, up) for forward, up in FACES]
 
 
-def _point(position: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
+def _point(position: Position) -> tuple[float, float, float]:
     x, y, z = position
     return float(x), float(y), float(z)

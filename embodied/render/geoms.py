@@ -17,7 +17,7 @@ import numpy as np
 
 from embodied.geometry import rotation
 from embodied.house.house import House
-from embodied.render.camera import FAR_PLANE, NEAR_PLANE, Camera
+from embodied.render.camera import FAR_PLANE, NEAR_PLANE, Camera, Planes
 from embodied.render.panorama import face_rays, ray_stretch
 from embodied.scene.model import VISUAL, Scene, compile_scene
 
@@ -101,9 +101,7 @@ class Geoms:
         depth[(reversed_z <= 0) | (ids == 0)] = np.inf  # a painted sky is no thing
         return depth, ids
 
-    def view(
-        self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def view(self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray) -> Planes:
         """`rgb` of the size `drawn`, and `depth_and_ids` of `size`."""
         return self.rgb(camera, drawn, chosen), *self.depth_and_ids(camera, size, chosen)
 

@@ -18,7 +18,7 @@ import numpy as np
 from OpenGL import GL
 
 from embodied.render import atlas, coarser, shaders
-from embodied.render.camera import FAR_PLANE, NEAR_PLANE, Camera
+from embodied.render.camera import FAR_PLANE, NEAR_PLANE, Camera, Planes
 from embodied.render.supersampling import nearest, step_of
 from embodied.scene.lit_pages import LitMesh
 
@@ -112,9 +112,7 @@ class Raster:
         self._end()
         return _metres(near), ids
 
-    def view(
-        self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def view(self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray) -> Planes:
         """`rgb` of the size `drawn`, and `depth_and_ids` of `size`; from one pass where the pixels come out even.
 
         Then a pixel has the id of the nearest of the larger ones, whose middle is at most a third of a pixel from its

@@ -26,6 +26,7 @@ GRID, MOST_STEPS = 0.03, 16
 """Between places that are looked at for a gap, metres, and how many are along one side."""
 MOST_FLOOR_TAKEN = 0.25
 """Most of the floor that one can walk on which a thing left on it takes from it, square metres."""
+Rect = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class SurfaceOccupancy:
     """Things that already lie on the surfaces of one room."""
 
     ctx: Context
-    taken: dict[tuple[int, str], list[tuple[float, float, float, float]]] = field(default_factory=dict)
+    taken: dict[tuple[int, str], list[Rect]] = field(default_factory=dict)
     """For each CarrierSurface.key, x0, y0, x1, y1 of what lies there, in the carrier's frame."""
     alike: Counter[str] = field(default_factory=Counter)
 
@@ -72,7 +73,7 @@ class SurfaceOccupancy:
                 (u, v), (a, b) = _in_frame(parent, thing), _reach(thing.size, thing.yaw - parent.yaw)
                 self.taken.setdefault((id(parent), thing.surface or ""), []).append((u - a, v - b, u + a, v + b))
 
-    def area(self, board: CarrierSurface) -> tuple[float, float, float, float]:
+    def area(self, board: CarrierSurface) -> Rect:
         """x0, x1, y0, y1 of what things may lie on: off the arms, backs and pillows of seats."""
         s, (kx, ky, _), (w, d, _) = board.surface, board.scale, board.carrier.size
         x0, x1, y0, y1 = s.x0 * kx, s.x1 * kx, s.y0 * ky, s.y1 * ky
@@ -113,7 +114,7 @@ class SurfaceOccupancy:
                     return self._lay(asset, board, (u - a, v - b, u + a, v + b), yaw, own, (w, d, h))
         return None
 
-    def _gaps(self, board: CarrierSurface, within: tuple[float, float, float, float], a: float, b: float) -> np.ndarray:
+    def _gaps(self, board: CarrierSurface, within: Rect, a: float, b: float) -> np.ndarray:
         """(n, 2) middles, in the carrier's frame, at which something a, b metres half wide and deep would lie free."""
         low_x, high_x, low_y, high_y = within
         if low_x > high_x or low_y > high_y:
@@ -145,15 +146,7 @@ class SurfaceOccupancy:
     def _meets_others(self, own: Box, carrier: Thing) -> bool:
         return any(overlap(own, q) and not same_box(q, carrier.box) for q in self.ctx.space.solids)
 
-    def _lay(
-        self,
-        asset: Asset,
-        board: CarrierSurface,
-        taken: tuple[float, float, float, float],
-        turn: float,
-        own: Box,
-        size: Size,
-    ) -> Thing:
+    def _lay(self, asset: Asset, board: CarrierSurface, taken: Rect, turn: float, own: Box, size: Size) -> Thing:
         carrier, looks = board.carrier, self.ctx.looks(asset)
         (x, y, z), yaw, name = (own.x, own.y, own.bottom), carrier.yaw + turn, board.surface.name
         thing = Thing(asset, x, y, z, yaw, size, looks, carrier, name, carrier.group, role="small")

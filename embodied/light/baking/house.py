@@ -28,19 +28,10 @@ from embodied.light.baking.probes import probes_of
 from embodied.light.baking.solve import BakeInput, Radiosity, solve
 from embodied.light.baking.stages import facts_of, kept_light
 from embodied.light.baking.surroundings import Outside, daylit, dome_mesh, outside_of
-from embodied.light.pages import tone
+from embodied.light.pages import files, tone
 from embodied.light.pages.atlas import Atlas, atlas_of, coarsened, meshes_of, things_of
 from embodied.light.pages.colours import ColourMaps
-from embodied.light.pages.files import (
-    PROBES,
-    Bake,
-    StaleBake,
-    open_bake,
-    packed_meshes,
-    page_files,
-    reopened,
-    write_pages,
-)
+from embodied.light.pages.files import Bake, StaleBake
 from embodied.light.pages.tone import expose
 from embodied.light.settings import QUALITIES, LightSettings, light_code, settings_of
 from embodied.light.tracing.emitters import in_the_open, lamps_of, write_lamps
@@ -71,8 +62,6 @@ STAGES = {
     "done": (1.0, 1.0),
 }
 """Begin and end of each stage on the progress bar: its rough share of a bake's time."""
-TOGETHER = 8
-"""Pages that are composed before they are written, in one go; an interrupted bake loses no more."""
 
 
 def duration(house: House, quality: str) -> str:
@@ -167,10 +156,10 @@ def bake_all(
     for house in lightings:
         folder = _folder(cache, house, looks, settings)
         with contextlib.suppress(StaleBake):
-            out.append(open_bake(folder, house))
+            out.append(files.open_bake(folder, house))
             continue
         with locked(folder, wait=True):
-            done = reopened(folder, house)  # whoever held it may have made it
+            done = files.reopened(folder, house)  # whoever held it may have made it
             if done is None:
                 if context is None:
                     device()  # or LightError, before any work
@@ -264,7 +253,7 @@ class BakeContext:
     @functools.cached_property
     def meshes_file(self) -> bytes:
         """`meshes` as they are written."""
-        return packed_meshes(*self.meshes)
+        return files.packed_meshes(*self.meshes)
 
 
 def solve_house(
@@ -301,17 +290,16 @@ def _make(house: House, context: BakeContext, folder: Path, settings: LightSetti
     s = solve_house(house, context, settings, folder, progress=progress)
     error = check(s, settings.tolerance)
     free_memory()
-    if not (folder / PROBES).exists():
-        save_record(probes_of(s, settings, context.memory), folder / PROBES)
+    if not (folder / files.PROBES).exists():
+        save_record(probes_of(s, settings, context.memory), folder / files.PROBES)
     free_memory()
     composer = Composer(s, settings, context.maps, context.memory)
-    every = range(len(s.atlas.pages))
-    for i in every[::TOGETHER]:
-        progress("pages", i / len(every))
-        missing = [k for k in every[i : i + TOGETHER] if not all((folder / n).exists() for n in page_files(k))]
-        write_pages(folder, {k: page_of(k, composer) for k in missing}, settings.jpeg, context.memory)
-    free_memory()
     first = len(s.atlas.pages)
+    for i in range(first):
+        progress("pages", i / first)
+        if not all((folder / name).exists() for name in files.page_files(i)):
+            files.write_page(folder, i, page_of(i, composer), settings.jpeg, context.memory)
+    free_memory()
     pictures = daylit(context.outside, s.outdoors, s.exposure, settings.other_rays)
     for i, picture in enumerate(pictures, first):
         write_bytes(folder / f"page_{i:03d}.jpg", jpeg(picture, settings.jpeg))

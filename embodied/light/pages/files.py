@@ -6,7 +6,7 @@ its checksum.
 
 import functools
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -150,18 +150,13 @@ def page_files(i: int) -> tuple[str, ...]:
     return f"light_{i:03d}.npz", f"sun_{i:03d}.png", f"albedo_{i:03d}.jpg", f"page_{i:03d}.jpg"
 
 
-def write_pages(
-    folder: Path, pages: Mapping[int, Ingredients], quality: int, memory: LightingCache | None = None
-) -> None:
-    """Pages by number: light as half floats, the sun as PNG, colours (the same at all hours) and picture as JPEG of
-    `quality`."""
-    for i, page in pages.items():
-        light, sun, shown, picture = page_files(i)
-        write_bytes(folder / light, packed({"soft": page.soft, "glow": page.glow}))
-        write_bytes(folder / sun, cv2.imencode(".png", page.sun)[1].tobytes())
-        colours = get_or_compute(memory, ("colours", i), functools.partial(jpeg, page.albedo, quality))
-        write_bytes(folder / shown, colours)
-        write_bytes(folder / picture, jpeg(page.picture, quality))
+def write_page(folder: Path, i: int, page: Ingredients, quality: int, memory: LightingCache | None = None) -> None:
+    """Light as half floats, the sun as PNG, colours (the same at all hours) and picture as JPEG of `quality`."""
+    light, sun, shown, picture = page_files(i)
+    write_bytes(folder / light, packed({"soft": page.soft, "glow": page.glow}))
+    write_bytes(folder / sun, cv2.imencode(".png", page.sun)[1].tobytes())
+    write_bytes(folder / shown, get_or_compute(memory, ("colours", i), lambda: jpeg(page.albedo, quality)))
+    write_bytes(folder / picture, jpeg(page.picture, quality))
 
 
 def packed_meshes(meshes: Sequence[LitMesh], gloss: Sequence[np.ndarray]) -> bytes:
