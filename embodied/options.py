@@ -5,8 +5,6 @@ A command is a record of options and a function that takes it. A field's annotat
 A field that is a record of settings (`Settings`) is a group of options, one for each of its own fields.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import dataclasses

@@ -5,8 +5,6 @@ Any frozen dataclass, enum, tuple, mapping or small array can be written; where 
 several records, the object carries its class name under 'is'.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import functools

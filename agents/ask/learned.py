@@ -9,8 +9,6 @@ choice would be worth, and the network's choices should be worth as much as the 
 agent does not, such as where things are, averages out over houses.
 """
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 from collections.abc import Callable, Sequence

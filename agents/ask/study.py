@@ -1,7 +1,5 @@
 """Ask-v0's tables as data for the engine: all agents in houses never seen, and success against the moment of asking."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping, Sequence

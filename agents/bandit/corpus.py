@@ -9,8 +9,6 @@ of Debian and Ubuntu (MPL-2.0) and are never shipped: `fetch` asks the distribut
 them in a folder.
 """
 
-from __future__ import annotations
-
 import gettext
 import re
 import shutil

@@ -5,8 +5,6 @@ B sentences, S source and T target words, h hidden size, V target vocabulary. Ea
 number of the equation it computes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,8 +1,6 @@
 """BLEU of one sentence, smoothed, as a rating, and ratings of imperfect people (3.1.4): true scores made coarse, noisy
 and skewed; BLEU of a corpus, by sacrebleu, as a judgement."""
 
-from __future__ import annotations
-
 import collections
 import math
 from collections.abc import Sequence

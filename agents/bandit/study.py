@@ -3,8 +3,6 @@
 `pretrain_KEY/seed_N` holds reference models and critics that runs of a seed begin with.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence

@@ -8,8 +8,6 @@ Every draw is named by seed, pass and sentence, so a stage that was stopped goes
 had not been.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -9,8 +9,6 @@ whole sequence, or minus the costs that were still to come. HARI's equations are
 the value here and the signs of E.1 and E.2 turn around.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

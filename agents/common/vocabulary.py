@@ -1,7 +1,5 @@
 """Words to numbers: the vocabulary of a data set and the one tokenizer every learner uses."""
 
-from __future__ import annotations
-
 import collections
 import functools
 import itertools

@@ -5,8 +5,6 @@ The one checkpoint format: what decides how a run goes on, with the identity of 
 checkpoint is a PyTorch file of tensors, numbers and texts; nothing is unpickled.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

@@ -3,8 +3,6 @@
 N places, A ways of the one that has most, D size of a view's features, h hidden size, L words, C classes of things.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 import torch.nn.functional as F

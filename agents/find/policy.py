@@ -5,8 +5,6 @@ what is beside it; a decision is carried out before the next one is taken. The m
 seen in one episode and the ways between them, known again by what they look like.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

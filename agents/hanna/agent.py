@@ -16,8 +16,6 @@ N is any number of (episode, step) pairs, A the number of navigation actions. Ea
 where a label says that the step is not to be learned from.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence

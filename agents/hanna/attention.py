@@ -9,8 +9,6 @@ treats each agent alone; masks say which memory entries an agent may see, so wha
 does not depend on who else is in the batch.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ It predicts no reasons, is trained without the curiosity loss, and its recurrent
 reset within an episode.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import torch

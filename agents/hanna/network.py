@@ -11,8 +11,6 @@ decided so (docs/sources.md, by its numbers):
   * the help-request network compares only with past steps at which it asked (S26).
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from typing import Any

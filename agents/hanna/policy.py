@@ -1,7 +1,5 @@
 """HannaPolicy: the networks as a Policy of embodied.interface, batched over episodes; and as one that learns."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """HANNA as a learner of embodied.agents.studies.engine."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

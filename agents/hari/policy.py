@@ -4,8 +4,6 @@ DO does what the execution policy most wants to do; where that is to stop, the g
 The belief b^s advances at every time step (appendix E), so that what CUR answered is part of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -8,8 +8,6 @@
 A simulator supplies dense descriptions here, so no assistant takes part (the pre-training phase of 4.3.5).
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

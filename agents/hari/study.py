@@ -1,8 +1,6 @@
 """Tables 4.7 and 4.8, Figures 4.5 and 4.6 as data; HARI as a learner of the engine; and rules that choose intentions
 where nothing has learned to, the upper half of Table 4.7, with all rows of the table for one trained agent."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

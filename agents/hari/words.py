@@ -4,8 +4,6 @@ A feature set is summed up from five embeddings: name, type, horizontal and vert
 distance. Index 0 of each table is silent; of the names, 1 stands for all that are not known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

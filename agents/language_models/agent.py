@@ -6,8 +6,6 @@ Whoever words an answer is told what the assistant would say and, where it told 
 nothing else.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ What was asked before is never asked again. A server that fails is tried again, 
 from there. Keys come from the environment and go into the request's header, nowhere else.
 """
 
-from __future__ import annotations
-
 import json
 import logging
 import random

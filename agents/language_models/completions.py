@@ -4,8 +4,6 @@ A server's failure (an error, an empty body, no chat completion) is an error. An
 (wrong JSON, an unknown tool, cut short) is an answer with a problem, which is kept and counted like any other.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping

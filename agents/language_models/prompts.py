@@ -5,8 +5,6 @@ An agent is told its observation in words and in pictures: what is in sight, whe
 tells one place from another. A picture is one numbered strip of candidate views, or the panorama with numbered markers.
 """
 
-from __future__ import annotations
-
 import base64
 import dataclasses
 import io

@@ -3,8 +3,6 @@
 Every failure is a ServerError that names its cause and says what to do; no more than MOST_BYTES are read of a response.
 """
 
-from __future__ import annotations
-
 import contextlib
 import html
 import http.client

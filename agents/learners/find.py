@@ -1,7 +1,5 @@
 """Agents that find things without help, with sight and without: their settings, and `embodied study find`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

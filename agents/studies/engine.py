@@ -6,8 +6,6 @@ never to old numbers under new captions. A table is written as LEARNER-TABLE.jso
 where it has a figure.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import itertools

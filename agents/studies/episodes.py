@@ -1,7 +1,5 @@
 """Studies of agents that play episodes on a data set: what is common to them, so that a learner is a few functions."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,8 +1,6 @@
 """A small network that answers questions about videos (embodied.datasets.vqa): the words of a question say which finds
 of the shipped detector matter. Where it beats its twin that sees nothing, sight is worth something."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math

@@ -1,7 +1,5 @@
 """How encoders and detectors are trained. Free of torch, so that the command line answers at once."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated

@@ -7,8 +7,6 @@ A 1x1 convolution mixes its maps of cells of 16 and of 32 pixels, both in cells 
 The compact network: a residual network (He et al. 2016) of one block in each of four stages.
 """
 
-from __future__ import annotations
-
 import copy
 
 import torch

@@ -1,7 +1,5 @@
 """Features of panoramas as they are seen: what Gymnasium environments show where no features were made before."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from embodied.agents.common.settings import SHIPPED_ENCODER

@@ -7,8 +7,6 @@
 Nothing is drawn here: the data set must hold panoramas.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import os

@@ -6,8 +6,6 @@ In place recognition these are changes of appearance (hour, weather, lamps), of 
 camera.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence

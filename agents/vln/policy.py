@@ -5,8 +5,6 @@ Tan et al. 2019). B agents, A actions of the one that has most (0 is stop), L wo
 hidden size.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

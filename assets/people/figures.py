@@ -1,7 +1,5 @@
 """Everybody of the pack as things of the catalogue, one for each pose in which people stay where they are."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """Ask-v0's assistant: true answers to typed questions about the object that is meant, in plain words."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

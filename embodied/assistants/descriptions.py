@@ -1,7 +1,5 @@
 """HARI's bag-of-features descriptions of places (dissertation 4.3.5 and appendix E), as arrays and in words."""
 
-from __future__ import annotations
-
 import bisect
 import functools
 import math

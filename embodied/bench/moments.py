@@ -1,8 +1,6 @@
 """Houses at a moment with five movers each, and what a path tracer shows of them; and pictures of the people of lit
 houses, as those see them who meet them."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Things that move in lit houses, against the path tracer of the same moment, and what a frame with them costs."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import itertools

@@ -1,7 +1,5 @@
 """Timing a thing several times and saying what came out."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import platform

@@ -4,8 +4,6 @@ This is the one place of the package where everything meets: subcommands may imp
 `agents`, late and inside `run`, so that `embodied --help` answers at once.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import errno

@@ -5,8 +5,6 @@ products of a kind (assets, light, panoramas ...). EMBODIED_CACHE may name sever
 are read from all of them and written to the first, so that a group can share a read-only one.
 """
 
-from __future__ import annotations
-
 import shutil
 import time
 from dataclasses import dataclass

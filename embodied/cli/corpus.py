@@ -7,8 +7,6 @@ The first fetches LibreOffice's help and menus with apt (three Debian or Ubuntu 
 finds them in a folder. No document is in two splits. A corpus of your own text is a folder with the same files.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

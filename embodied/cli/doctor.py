@@ -4,8 +4,6 @@ Prints the renderer (vendor, device, software or hardware), the furniture found,
 with 1, and says what to do, when houses cannot be generated or rendered.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib.metadata
 import platform

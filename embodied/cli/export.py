@@ -1,7 +1,5 @@
 """Export a data set or a house to the formats of other programs."""
 
-from __future__ import annotations
-
 from embodied.cli.exports import registered_exports
 
 COMMANDS = registered_exports()

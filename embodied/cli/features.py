@@ -4,8 +4,6 @@ Houses that have features of this encoder are skipped. The encoder is the shippe
 `embodied train vision`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

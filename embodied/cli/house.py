@@ -4,8 +4,6 @@ Writes house.json (the house as data), house.xml with its meshes and textures (o
 connectivity.json (the navigation graph in Matterport's format) and plan.png.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

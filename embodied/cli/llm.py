@@ -3,8 +3,6 @@
 embodied llm serve --port 8765
 """
 
-from __future__ import annotations
-
 import importlib.util
 import subprocess
 import sys

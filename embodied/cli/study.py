@@ -7,8 +7,6 @@
 written as JSON, Markdown and, for some, as a figure. Rerun an interrupted command to resume.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Ask-v0's rule of play: every question costs a step and a price; stopping ends the episode."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ plain navigation: moves move, stop ends. A rule with help overrides three method
 does, what stopping does, and what may be asked.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from collections.abc import Mapping

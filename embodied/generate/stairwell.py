@@ -1,7 +1,5 @@
 """Stairs of a plan: which flight fits a stairwell, where it runs, and where one walks beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast

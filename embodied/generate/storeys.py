@@ -1,7 +1,5 @@
 """Houses of several storeys: which rooms lie on which storey, and plans above each other that share a stairwell."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 An action has a number for each of BRING_QUESTIONS; as it rises above 0.5, the question is asked.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping

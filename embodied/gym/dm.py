@@ -1,7 +1,5 @@
 """Our Gymnasium environments as dm_env.Environment, for users of dm_control and Acme (extra `robots`)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import dm_env

@@ -6,8 +6,6 @@ An action says how fast ahead and how fast to the left, each from -1 to 1, and i
 physics goes on; to find something, a third number above 0.5 says that it is here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

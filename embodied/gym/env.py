@@ -15,8 +15,6 @@ agent sees is chosen by `observations` (embodied.gym.sensors): by default a pers
 that the shipped encoder finds in the same pictures. An oracle is called an oracle.
 """
 
-from __future__ import annotations
-
 import functools
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Makes the environments known to gymnasium.make, without importing Gymnasium for those who do not use it."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Feature sources without a CNN: what objects are in which view, and which room one is in."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 

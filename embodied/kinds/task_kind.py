@@ -17,8 +17,6 @@ Only `name`, `title` and `tasks` are needed. What else a kind may say, and who r
     how an episode is told                      story, monocular                    viz
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -25,8 +25,6 @@ there is no `cbf`, which fills holes in scanned depth: ours has none; angles are
 have them; random starts are drawn otherwise; nothing is read in advance, and there are no timers.
 """
 
-from __future__ import annotations
-
 import sys
 import types
 

@@ -1,7 +1,5 @@
 """Run a program that imports MatterSim with the stand-in: python -m embodied.mattersim DIALECT SCRIPT [ARGUMENTS]."""
 
-from __future__ import annotations
-
 import runpy
 import sys
 from collections.abc import Sequence

@@ -10,8 +10,6 @@ neighbour straight above or below is never within. Navigable viewpoints are sort
 sqrt(rel_heading^2 + rel_elevation^2), the agent's own first (index 0: stay).
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -6,8 +6,6 @@ today reads `<id>_skybox_small.jpg` and `<id>_skybox_depth_small.png` (16 bits, 
 its first release `<id>_skybox{0..5}_sami.jpg`.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Sequence

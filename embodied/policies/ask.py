@@ -4,8 +4,6 @@ All explore alike: they remember where they have been (a robot's odometry; that 
 for the oracle), walk up to what looks like the thing, and follow a route while it is shown. They do not read.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any

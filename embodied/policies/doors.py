@@ -1,7 +1,5 @@
 """Agents for houses with closed doors that do not learn (docs/doors.md)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -4,8 +4,6 @@ The listener sees what an agent may see on the way, with the names of visible ob
 language, not of vision); it is given its places and the Situation because it reads the names there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The server: pages, panoramas, and one WebSocket per browser that carries screens out and actions in."""
 
-from __future__ import annotations
-
 import asyncio
 import functools
 import hashlib

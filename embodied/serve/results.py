@@ -5,8 +5,6 @@ Learners read it like any other. HANNA's assistants and ILIAD's describers speak
 advisor says a sub-goal as a person did where somebody meant the same actions.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import shutil
 from collections import Counter, defaultdict

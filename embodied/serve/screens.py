@@ -1,7 +1,5 @@
 """Messages to a browser: everything on somebody's screen as one JSON object, so that a reload loses nothing."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@
 is not in the log, who is connected and who is ready, begins anew then.
 """
 
-from __future__ import annotations
-
 import secrets
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Deeds of people, as a log of events in SQLite: whatever was acknowledged is on disk."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import json

@@ -1,7 +1,5 @@
 """Goal nodes, where an object can be found, per object class, room kind and house; and tasks of going there."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

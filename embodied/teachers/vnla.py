@@ -1,7 +1,5 @@
 """VNLA's teachers: the shortest way in turns and steps, and the rules of when to ask (docs/sources.md, S49, S50)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ The describer of NAV (Figure C.4) reads a walk and writes; who follows is agents
 steps, E size of a view's features and direction, h hidden size.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np

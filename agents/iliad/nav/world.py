@@ -1,7 +1,5 @@
 """NAV as a problem of ILIAD: trips through houses, walks, and shortest paths without requests (3.2.4.2, C.1.1)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ A template is a request with slots for letters: '{b1}' is the first letter that 
 '{a2}' the second that is written. 'every [{b1}] becomes [{a1}]' stands for '()(n)()@c' and others.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import itertools

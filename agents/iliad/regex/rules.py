@@ -11,8 +11,6 @@ T characters or words that are written, h hidden size. The student is a speller 
 speller of words.
 """
 
-from __future__ import annotations
-
 import functools
 import itertools
 import re

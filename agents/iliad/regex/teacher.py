@@ -1,8 +1,6 @@
 """REGEX as a problem of ILIAD: what an execution is, what fulfils a request, and a student that writes rules; and who
 describes what a rule did: a describer with an executor (3.2.4.1), or the grammar that asks for rules."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Formats that `embodied export` writes; each file of this folder registers some."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Walks, drives and episodes with what is seen on the way, for published learners, and goals of `goat` data."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass
 from typing import Annotated, Any

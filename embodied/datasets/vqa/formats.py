@@ -1,7 +1,5 @@
 """Questions in the formats of VSI-Bench, LLaVA, SAT and OpenEQA."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path

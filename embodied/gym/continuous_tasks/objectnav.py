@@ -1,7 +1,5 @@
 """ObjectNav: go near an object of a class, as Habitat's (Anderson et al. 2018)."""
 
-from __future__ import annotations
-
 from embodied.datasets.habitat import object_episodes, read_objectnav
 from embodied.envs.continuous import Body, CameraConfig, ContinuousEpisode
 from embodied.gym.continuous import ContinuousTask, EpisodeSource, register_continuous

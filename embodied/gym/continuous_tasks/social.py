@@ -1,7 +1,5 @@
 """SocialNav: go to a point among people who walk to and fro (Social-HM3D, Falcon: Gong et al. 2024)."""
 
-from __future__ import annotations
-
 from embodied.envs.continuous import ContinuousEpisode, NavigationGoal
 from embodied.gym.continuous import ContinuousTask, EpisodeSource, register_continuous
 from embodied.kinds.shipped.social import SOCIAL

@@ -1,7 +1,5 @@
 """VLNCE: follow an instruction along a route, as VLN-CE (Krantz et al. 2020)."""
 
-from __future__ import annotations
-
 from embodied.datasets.habitat import read_vlnce, route_episodes
 from embodied.envs.continuous import ContinuousEpisode
 from embodied.gym.continuous import ContinuousTask, EpisodeSource, register_continuous

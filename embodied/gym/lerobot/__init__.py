@@ -11,8 +11,6 @@ ObjectNav-v0 a score for each action, of which the largest is taken; in Drive-v0
 EnvHub reads a file `env.py` of a repository; `hub_file` writes one that makes these environments.
 """
 
-from __future__ import annotations
-
 import functools
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Ask: find one described object among its like; questions have prices (Ask-v0, docs/ask.md)."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Doors: find a thing of a class in a house in which doors are closed (docs/doors.md)."""
 
-from __future__ import annotations
-
 import functools
 
 from embodied.action_spaces import doors_in

@@ -4,8 +4,6 @@ After Das et al. 2018 (arXiv 1711.11543). Answers are from a closed set, so no m
 what they rest on was in view, as in EXPRESS-Bench (Jiang et al. 2025, arXiv 2503.11117).
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import itertools

@@ -1,7 +1,5 @@
 """Find: go near any thing of a class, without help."""
 
-from __future__ import annotations
-
 from embodied.kinds.shipped.hanna import TABLE_4_2
 from embodied.kinds.task_kind import Parts, PartTasks, StoryStyle, TaskInputs, TaskKind, parts_of_pool, register_kind
 from embodied.tasks.goals import find_pool, find_task

@@ -1,7 +1,5 @@
 """VNLA: find a thing in a kind of room, with an advisor and a request budget (dissertation 4.1)."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
