@@ -22,9 +22,9 @@ from embodied.house.house import HINGED, House
 from embodied.house.moment import Moment, RigidPose, apart
 from embodied.house.validation import load_lit_house
 from embodied.interface import Sighting
+from embodied.navigation.floor_ways import FreePoses
 from embodied.navigation.free_space import closed_doors
 from embodied.navigation.graph import NavGraph, build_graph
-from embodied.navigation.poses import FreePoses
 from embodied.people.day import day_of, seconds_of
 from embodied.records import differences
 from embodied.render.camera import View

@@ -133,7 +133,6 @@ REVIEWED = {
     "embodied/locks.py": "its own lock",
     "embodied/datasets/lerobot.py": "an empty folder",
     "embodied/light/baking/house.py": "a bake in the cache",
-    "embodied/light/baking/stages.py": "stages of a bake in the cache",
     "embodied/light/pages/files.py": "a bake in the cache",
     "embodied/scene/collision.py": "a file in the cache",
     "embodied/scene/export.py": "house.xml, which it writes anew",

@@ -30,10 +30,9 @@ from embodied.language.lexicon import lexicon_of
 from embodied.language.route_clauses import legs_of
 from embodied.language.templates import SPEAKERS
 from embodied.navigation.connectivity import from_matterport, to_matterport
-from embodied.navigation.floor_ways import FloorWays
+from embodied.navigation.floor_ways import FloorWays, FreePoses
 from embodied.navigation.free_space import EYE
 from embodied.navigation.graph import build_graph, stair_ends
-from embodied.navigation.poses import FreePoses
 from embodied.scene.model import COLLISION, build_spec
 from embodied.scene.stairs import flights_of, railings
 from embodied.seeds import stream

@@ -18,15 +18,14 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from embodied.assets.cache import digest, write_bytes, write_json
+from embodied.assets.cache import atomic_path, digest, write_bytes, write_json
 from embodied.assets.catalogue import Catalogue
-from embodied.assets.decoding import jpeg, save_record
+from embodied.assets.decoding import jpeg, load_record, save_record
 from embodied.house.house import WEATHERS, House, Sky
 from embodied.light.backend import LightingCache, device, free_memory, get_or_compute, warn
 from embodied.light.baking.compose import Composer, LightSolution, page_of
 from embodied.light.baking.probes import probes_of
 from embodied.light.baking.solve import BakeInput, Radiosity, solve
-from embodied.light.baking.stages import facts_of, kept_light
 from embodied.light.baking.surroundings import Outside, daylit, dome_mesh, outside_of
 from embodied.light.pages import files, tone
 from embodied.light.pages.atlas import Atlas, atlas_of, coarsened, meshes_of, things_of
@@ -62,6 +61,8 @@ STAGES = {
     "done": (1.0, 1.0),
 }
 """Begin and end of each stage on the progress bar: its rough share of a bake's time."""
+GAINS = ("levels", "gains", "outdoors")
+"""Arrays of an `Exposure`."""
 
 
 def duration(house: House, quality: str) -> str:
@@ -272,7 +273,7 @@ def solve_house(
     bare = tuple(sorted({x.owner for x in lamps if x.owner in atlas.owners}))
     without = get_or_compute(context.memory, ("without", bare), lambda: scenes_without(space, atlas, bare))
     inputs = BakeInput(house, atlas, lux, space, outdoors, lamps, settings, context.memory, without)
-    light = kept_light(folder, len(lux.position), lambda: solve(inputs, progress))
+    light = _kept_light(folder, len(lux.position), lambda: solve(inputs, progress))
     rows = len(outdoors.picture)
     outside = np.median(outdoors.picture[rows * 300 // 1024 : rows * 540 // 1024].reshape(-1, 3), axis=0)
     light_of_rooms = _light_of_rooms(house, atlas, lux, light)
@@ -281,6 +282,22 @@ def solve_house(
         warn(f"rooms {dark} have neither window nor lamp that lights them; they are shown nearly dark")
     exposure = expose(house, light_of_rooms, outside)
     return LightSolution(house, atlas, lux, light, outdoors, lamps, exposure, space, without)
+
+
+def _kept_light(folder: Path | None, n: int, work: Callable[[], Radiosity]) -> Radiosity:
+    """Result of `work`, from disk if an interrupted run left it there whole."""
+    if folder is None:
+        return work()
+    path = folder / "stage_light.npz"
+    known = load_record(Radiosity, path)
+    if known is not None and all(len(a) == n for a in vars(known).values()):
+        return known
+    if path.exists():
+        warn(f"{path} is damaged; the stage is computed again")
+    made = work()
+    with atomic_path(path) as temporary, open(temporary, "wb") as f:
+        np.savez(f, **vars(made))  # quicker to write than what `save_record` packs
+    return made
 
 
 def _make(house: House, context: BakeContext, folder: Path, settings: LightSettings, progress: Progress) -> Bake:
@@ -307,7 +324,7 @@ def _make(house: House, context: BakeContext, folder: Path, settings: LightSetti
     write_lamps(folder / "lamps.npz", s.lamps)
     (folder / "stage_light.npz").unlink(missing_ok=True)
     manifest = {
-        **facts_of(s, context.meshes[0], folder),
+        **_facts_of(s, context.meshes[0], folder),
         "settings": dataclasses.asdict(settings),
         "pages": first + len(pictures),
         "unwrap_seconds": context.unwrap_seconds,
@@ -318,6 +335,27 @@ def _make(house: House, context: BakeContext, folder: Path, settings: LightSetti
     write_json(folder / "manifest.json", manifest)
     progress("done", 1.0)
     return Bake(folder, manifest)
+
+
+def _facts_of(s: LightSolution, meshes: Sequence[LitMesh], folder: Path) -> dict[str, object]:
+    """Facts of the manifest about a bake whose files are written, but how it was made."""
+    written = [p for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")]
+    return {
+        "code": light_code(),
+        "key": folder.name,
+        "house": s.house.digest,
+        "device": device(),
+        "own_pages": len(s.atlas.pages),
+        "owners": list(owners(s.house)),
+        "luxels": len(s.lux.position),
+        "exposure": {"polygons": s.exposure.polygons, **{k: getattr(s.exposure, k).tolist() for k in GAINS}},
+        "meshes": [
+            {"owner": m.owner, "kind": m.kind, "room": m.room, "page": m.page, "alpha": m.alpha, "gloss": m.gloss}
+            for m in meshes
+        ],
+        "lamps": [{"id": x.id, "room": x.room, "owner": x.owner} for x in s.lamps],
+        "files": {p.name: files.checksum(p) for p in written},
+    }
 
 
 def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Radiosity) -> dict[str, np.ndarray]:
