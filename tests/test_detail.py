@@ -7,9 +7,8 @@ import pytest
 
 from embodied.assets.materials import MATERIALS
 from embodied.assets.records import DETAILS
-from embodied.render.camera import Camera, camera_at
+from embodied.render.camera import Camera, camera_at, pixel_rays
 from embodied.render.detail import Detail, pyramid
-from embodied.render.gloss import _directions
 
 SIZE = 128
 
@@ -19,10 +18,10 @@ def drawn(camera: Camera, code: int, distance: float) -> np.ndarray:
     corners = np.array([[[0, -9, -9], [0, 9, -9], [0, 0, 9]]], np.float32)
     detail = Detail(corners, np.array([[-1, 0, 0]], np.float32), np.array([code], np.uint8))
     out = np.full((SIZE, SIZE, 3), 128, np.uint8)
-    half = _directions(camera, (SIZE, SIZE), step=2)
+    half = pixel_rays(camera, (SIZE, SIZE), step=2)
     far = (distance / (half @ np.asarray(camera.forward, np.float32))).astype(np.float32)
     n = len(half)
-    detail.lay(out, camera, _directions(camera, (SIZE, SIZE)), np.zeros(n, int), far)
+    detail.lay(out, camera, pixel_rays(camera, (SIZE, SIZE)), np.zeros(n, int), far)
     return out.astype(int)
 
 

@@ -7,9 +7,6 @@ from scipy.spatial import cKDTree
 CREASE = np.radians(42.0)
 """Faces that meet at less than this angle share a smooth normal."""
 
-Mesh = tuple[np.ndarray, np.ndarray, np.ndarray | None]
-"""Vertices (n, 3), faces (m, 3), and uv (m, 3, 2) of the faces' corners or None."""
-
 PAIRS = 4_000_000
 """Pairs of corners compared at a time."""
 
@@ -100,7 +97,7 @@ def corner_angles(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return angles
 
 
-def decimate(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, target: int) -> Mesh:
+def decimate(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, target: int) -> tuple:
     """About `target` faces with the same look.
 
     Args:

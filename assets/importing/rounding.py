@@ -7,7 +7,7 @@ of sofas, cushions and tubes have round outlines and not only round shading.
 
 import numpy as np
 
-from embodied.assets.importing.meshing import Mesh, corner_angles, crease_normals, face_normals
+from embodied.assets.importing.meshing import corner_angles, crease_normals, face_normals
 
 SAG = 0.0012
 """Metres between an edge and the curve over it, from which on the edge is split."""
@@ -28,7 +28,9 @@ LIES = 0.9
 surface is touched within 5 mm)."""
 
 
-def rounded(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, crease: float, most: int) -> Mesh:
+def rounded(
+    vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, crease: float, most: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """The mesh with its curved edges split, those that are farthest from their curve first; its box stays.
 
     Args:
@@ -51,7 +53,9 @@ def rounded(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, crea
     return vertices, faces, uv
 
 
-def refined(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, longest: float, most: int) -> Mesh:
+def refined(
+    vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, longest: float, most: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """The mesh with the edges of what hangs halved until none is longer than `longest`, longer ones first.
 
     Args:
@@ -147,7 +151,7 @@ def _split(
     number: np.ndarray,
     chosen: np.ndarray,
     middles: np.ndarray,
-) -> Mesh:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """The mesh with a vertex in each of the `chosen` edges: faces become two, three or four.
 
     Args:

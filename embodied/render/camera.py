@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -73,3 +74,51 @@ def face_cameras(position: Position) -> list[Camera]:
 def _point(position: Position) -> tuple[float, float, float]:
     x, y, z = position
     return float(x), float(y), float(z)
+
+
+def pixel_rays(
+    camera: Camera,
+    size: tuple[int, int],
+    pixels: np.ndarray | None = None,
+    step: int = 1,
+    aside: np.ndarray | None = None,
+) -> np.ndarray:
+    """(n, 3) float32 unit rays through pixels (flat positions; all without) of a picture of `size`.
+
+    Args:
+      step: every so many pixels only; then `pixels` is None.
+      aside: (n, 2) pixels to the right and down from the centres.
+    """
+    if pixels is None:
+        return _all_rays(tuple(camera.forward), tuple(camera.up), camera.vfov, size, step)
+    if aside is None:
+        return _all_rays(tuple(camera.forward), tuple(camera.up), camera.vfov, size, 1)[pixels]
+    h, w = size
+    forward, up = np.asarray(camera.forward, np.float32), np.asarray(camera.up, np.float32)
+    right, tall = np.cross(forward, up), math.tan(camera.vfov / 2)
+    x, y = _across(size, 1, tall)
+    row, column = np.divmod(pixels, w)
+    across, along = x[column] + aside[:, 0] * (2 * tall / h), y[row] - aside[:, 1] * (2 * tall / h)
+    rays = forward + across[:, None] * right + along[:, None] * up
+    return (rays / np.linalg.norm(rays, axis=1, keepdims=True)).astype(np.float32)
+
+
+@functools.lru_cache(maxsize=24)
+def _all_rays(
+    forward: tuple[float, ...], up: tuple[float, ...], vfov: float, size: tuple[int, int], step: int
+) -> np.ndarray:
+    """Kept, as panoramas look along the same six directions from everywhere."""
+    ahead, above = np.asarray(forward, np.float32), np.asarray(up, np.float32)
+    x, y = _across(size, step, math.tan(vfov / 2))
+    rays = ahead + x[None, :, None] * np.cross(ahead, above) + y[:, None, None] * above
+    rays = rays.reshape(-1, 3)
+    rays = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).astype(np.float32)
+    rays.flags.writeable = False
+    return rays
+
+
+def _across(size: tuple[int, int], step: int, tall: float) -> tuple[np.ndarray, np.ndarray]:
+    """How far to the right and up of its middle the columns and rows of a picture are, a metre ahead."""
+    h, w = size
+    x = ((np.arange(0, w, step) + step / 2) / w * 2 - 1) * tall * w / h
+    return x, (1 - (np.arange(0, h, step) + step / 2) / h * 2) * tall

@@ -10,7 +10,6 @@ flicker against each other. Depth and ids stay.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,11 +17,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from embodied.geometry import r2
-from embodied.render.camera import Camera
+from embodied.render.camera import Camera, pixel_rays
 from embodied.render.detail import Detail
 from embodied.render.film import light_of, shown_of
-from embodied.render.mirrored import FINE_TILE, TILE, Mirrored, evened
+from embodied.render.mirrored import FINE_TILE, TILE, Mirrored, evened, interleaved, lobe
 from embodied.scene.lit_pages import LitMesh, LitPages, glass_surfaces
 
 Rays = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
@@ -189,9 +187,9 @@ class Gloss:
         h, w = rgb.shape[:2]
         out = np.array(rgb)
         half = (h + 1) // 2, (w + 1) // 2
-        ahead = _directions(camera, (h, w), step=2)
+        ahead = pixel_rays(camera, (h, w), step=2)
         met = self._met(camera, ahead)
-        self._detail.lay(out, camera, _directions(camera, (h, w)), *met)
+        self._detail.lay(out, camera, pixel_rays(camera, (h, w)), *met)
         seen = self._seen(ahead, *met)
         if seen.rough.any():
             values = self._enlarged(camera, self._rough(seen.of(seen.rough), camera, half), (h, w))
@@ -252,7 +250,7 @@ class Gloss:
     def _lay_panes(self, out: np.ndarray, camera: Camera, panes: _Panes) -> None:
         """Lay what panes of glass mirror over `out` (h, w, 3): windows at night show the room."""
         h, w = out.shape[:2]
-        rough = _directions(camera, (h, w), step=PANE_STEP)
+        rough = pixel_rays(camera, (h, w), step=PANE_STEP)
         at = np.asarray(camera.position, np.float32)
         shape = (-(-h // PANE_STEP), -(-w // PANE_STEP))
         on_pane = (panes.first(np.broadcast_to(at, rough.shape), rough)[0] >= 0).reshape(shape)
@@ -260,7 +258,7 @@ class Gloss:
             return
         near = cv2.dilate(on_pane.astype(np.uint8), np.ones((3, 3), np.uint8)).repeat(PANE_STEP, 0).repeat(PANE_STEP, 1)
         pixels = np.flatnonzero(near[:h, :w])
-        ahead = _directions(camera, (h, w), pixels)
+        ahead = pixel_rays(camera, (h, w), pixels)
         origin = np.broadcast_to(at, ahead.shape)
         pane, distance, _, _ = panes.first(origin, ahead)
         hit = np.flatnonzero(pane >= 0)
@@ -345,7 +343,7 @@ class Gloss:
           k: (n,) which of `count` parts of the lobe each pixel looks into.
         """
         several = seen.of(np.repeat(np.arange(len(k)), rays))
-        u = _lobe(count * rays)[(k[:, None] * rays + np.arange(rays)).ravel()]
+        u = lobe(count * rays)[(k[:, None] * rays + np.arange(rays)).ravel()]
         half = _half_vectors(several.normal, several.roughness, u)
         values = np.concatenate(self._mirrored(camera, several, half, sharp=sharp), axis=1)
         return values.reshape(len(k), rays, 6).mean(1)
@@ -359,7 +357,7 @@ class Gloss:
             return values
         flat = values.reshape(4, -1)
         flat[:, pixels] = 0
-        ahead = _directions(camera, size, pixels)
+        ahead = pixel_rays(camera, size, pixels)
         seen = self._seen(ahead, *self._met(camera, ahead), pixels)
         seen = seen.of(seen.rough)
         near = grid.nearest(*np.divmod(seen.pixel, w), self._faces.owner[seen.face], seen.normal)
@@ -371,7 +369,7 @@ class Gloss:
         pixels = np.flatnonzero(where)
         all_pixels = np.tile(pixels, len(SUBPIXEL_OFFSETS))
         aside = np.repeat(np.array(SUBPIXEL_OFFSETS, np.float32), len(pixels), axis=0)
-        ahead = _directions(camera, rgb.shape[:2], all_pixels, aside=aside)
+        ahead = pixel_rays(camera, rgb.shape[:2], all_pixels, aside=aside)
         seen = self._seen(ahead, *self._met(camera, ahead), all_pixels)
         turn = np.repeat(np.arange(len(SUBPIXEL_OFFSETS)), len(pixels))
         row, column = np.divmod(all_pixels, rgb.shape[1])
@@ -459,71 +457,6 @@ def _half_vectors(normal: np.ndarray, rough: np.ndarray, u: np.ndarray) -> np.nd
     two = np.stack([b, sign + y * y * a, -y], axis=1)
     half = one * (sin * np.cos(phi))[:, None] + two * (sin * np.sin(phi))[:, None] + normal * cos[:, None]
     return half.astype(np.float32)
-
-
-@functools.cache
-def interleaved(n: int) -> np.ndarray:
-    """(n, n) int: numbers from 0 to n * n - 1, n a power of two, so that every aligned square of 4, 16, ... pixels has
-    consecutive ones (Morton 1966), which are spread over the whole lobe."""
-    bits = np.arange(n)
-    wide = np.sum([((bits >> b) & 1) << 2 * b for b in range(n.bit_length() - 1)], axis=0)
-    return 2 * wide[:, None] + wide[None, :]
-
-
-@functools.cache
-def _lobe(n: int) -> np.ndarray:
-    """(n, 2) float32 evenly spread numbers in [0, 1): neighbours in the picture are far apart in the lobe."""
-    points = np.array([r2(k + 1) for k in range(n)]) % 1.0
-    first = (np.argsort(np.argsort(points[:, 0])) + 0.5) / n * 0.98
-    return np.stack([first, points[:, 1]], axis=1).astype(np.float32)
-
-
-def _directions(
-    camera: Camera,
-    size: tuple[int, int],
-    pixels: np.ndarray | None = None,
-    step: int = 1,
-    aside: np.ndarray | None = None,
-) -> np.ndarray:
-    """(n, 3) float32 unit rays through pixels (flat positions; all without) of a picture of `size`.
-
-    Args:
-      step: every so many pixels only; then `pixels` is None.
-      aside: (n, 2) pixels to the right and down from the centres.
-    """
-    if pixels is None:
-        return _all_directions(tuple(camera.forward), tuple(camera.up), camera.vfov, size, step)
-    if aside is None:
-        return _all_directions(tuple(camera.forward), tuple(camera.up), camera.vfov, size, 1)[pixels]
-    h, w = size
-    forward, up = np.asarray(camera.forward, np.float32), np.asarray(camera.up, np.float32)
-    right, tall = np.cross(forward, up), math.tan(camera.vfov / 2)
-    x, y = _across(size, 1, tall)
-    row, column = np.divmod(pixels, w)
-    across, along = x[column] + aside[:, 0] * (2 * tall / h), y[row] - aside[:, 1] * (2 * tall / h)
-    rays = forward + across[:, None] * right + along[:, None] * up
-    return (rays / np.linalg.norm(rays, axis=1, keepdims=True)).astype(np.float32)
-
-
-@functools.lru_cache(maxsize=24)
-def _all_directions(
-    forward: tuple[float, ...], up: tuple[float, ...], vfov: float, size: tuple[int, int], step: int
-) -> np.ndarray:
-    """Kept, as panoramas look along the same six directions from everywhere."""
-    ahead, above = np.asarray(forward, np.float32), np.asarray(up, np.float32)
-    x, y = _across(size, step, math.tan(vfov / 2))
-    rays = ahead + x[None, :, None] * np.cross(ahead, above) + y[:, None, None] * above
-    rays = rays.reshape(-1, 3)
-    rays = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).astype(np.float32)
-    rays.flags.writeable = False
-    return rays
-
-
-def _across(size: tuple[int, int], step: int, tall: float) -> tuple[np.ndarray, np.ndarray]:
-    """How far to the right and up of its middle the columns and rows of a picture are, a metre ahead."""
-    h, w = size
-    x = ((np.arange(0, w, step) + step / 2) / w * 2 - 1) * tall * w / h
-    return x, (1 - (np.arange(0, h, step) + step / 2) / h * 2) * tall
 
 
 def _faces_of(lit: LitPages, data: GlossData) -> _Faces:

@@ -1,9 +1,12 @@
 """Light that a picture's surfaces mirror, in half its size: averaged over a surface's neighbours, and enlarged."""
 
+import functools
 from collections.abc import Sequence
 
 import cv2
 import numpy as np
+
+from embodied.geometry import r2
 
 TILE = 8
 """Pixels after which the directions in the lobe repeat."""
@@ -137,3 +140,20 @@ def _apart(axis: int, k: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]
     """Index of all pixels but the last k along `axis`, and of all but the first k."""
     near, far = slice(None, -k), slice(k, None)
     return ((near, slice(None)), (far, slice(None))) if axis == 0 else ((slice(None), near), (slice(None), far))
+
+
+@functools.cache
+def interleaved(n: int) -> np.ndarray:
+    """(n, n) int: numbers from 0 to n * n - 1, n a power of two, so that every aligned square of 4, 16, ... pixels has
+    consecutive ones (Morton 1966), which are spread over the whole lobe."""
+    bits = np.arange(n)
+    wide = np.sum([((bits >> b) & 1) << 2 * b for b in range(n.bit_length() - 1)], axis=0)
+    return 2 * wide[:, None] + wide[None, :]
+
+
+@functools.cache
+def lobe(n: int) -> np.ndarray:
+    """(n, 2) float32 evenly spread numbers in [0, 1): neighbours in the picture are far apart in the lobe."""
+    points = np.array([r2(k + 1) for k in range(n)]) % 1.0
+    first = (np.argsort(np.argsort(points[:, 0])) + 0.5) / n * 0.98
+    return np.stack([first, points[:, 1]], axis=1).astype(np.float32)
