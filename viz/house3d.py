@@ -70,13 +70,13 @@ def light_meshes(parts: Sequence[Part], hidden: frozenset[str] = frozenset()) ->
     return tuple(meshes)
 
 
-def log_house(recording: rr.RecordingStream, meshes: Sequence[LightMesh]) -> None:
-    """Log the house once, for all times."""
+def log_meshes(recording: rr.RecordingStream, meshes: Sequence[LightMesh], *, static: bool = True) -> None:
+    """Log a house once, for all times, or what is somewhere now."""
     for mesh in meshes:
         shape: dict[str, Any] = {"vertex_positions": mesh.positions, "triangle_indices": mesh.faces}
         shape |= {"vertex_normals": mesh.normals, "vertex_texcoords": mesh.uv}
         drawn = rr.Mesh3D(**shape, vertex_colors=mesh.colors, albedo_texture=mesh.picture)
-        recording.log(mesh.path, drawn, static=True)
+        recording.log(mesh.path, drawn, static=static)
 
 
 def log_people(recording: rr.RecordingStream, moment: Moment) -> None:
@@ -84,9 +84,7 @@ def log_people(recording: rr.RecordingStream, moment: Moment) -> None:
     for name, f in moment.people.items():
         parts, turn = posed(people()[f.person], f.pose, 1), f.place.rotation.T
         pieces = [(f.place.points(p.vertices), p.normals @ turn, vertex_colors(p), p.faces) for p in parts]
-        mesh = _joined(f"people/{name}", pieces)
-        shape: dict[str, Any] = {"vertex_positions": mesh.positions, "triangle_indices": mesh.faces}
-        recording.log(mesh.path, rr.Mesh3D(**shape, vertex_normals=mesh.normals, vertex_colors=mesh.colors))
+        log_meshes(recording, [_joined(f"people/{name}", pieces)], static=False)
 
 
 def lit_meshes(lit: LitPages, hidden: frozenset[str] = frozenset()) -> tuple[LightMesh, ...]:

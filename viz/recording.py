@@ -32,7 +32,7 @@ from embodied.render.camera import camera_at
 from embodied.render.panorama import Panorama, Recognised
 from embodied.render.photograph import PhotoCamera
 from embodied.viz.episode_log import EpisodeLog, question_of
-from embodied.viz.house3d import light_meshes, lit_meshes, log_house, log_people
+from embodied.viz.house3d import light_meshes, lit_meshes, log_meshes, log_people
 from embodied.viz.sinks import Sinks, blueprint_of, open_recording
 from embodied.world import World
 
@@ -165,7 +165,7 @@ def log_world(recording: rr.RecordingStream, world: World) -> None:
     keep = functools.partial(recording.log, static=True)
     keep("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     hung = frozenset(p.id for p in world.house.placements if world.catalogue.assets[p.asset].support == "ceiling")
-    log_house(recording, light_meshes(world.parts, hung) if world.lit is None else lit_meshes(world.lit, hung))
+    log_meshes(recording, light_meshes(world.parts, hung) if world.lit is None else lit_meshes(world.lit, hung))
     floor = on_floor(world.graph.positions, HEIGHTS["node"])
     keep("graph/nodes", rr.Points3D(floor, radii=0.06, colors=PALETTE["graph"]))
     strips = floor[np.asarray(world.graph.edges)]
