@@ -192,7 +192,7 @@ class Rays:
             self._model, self._data, eye, lines, None, 1, -1, geoms, metres, None, count, mujoco.mjMAXVAL
         )
         depth = np.where(geoms < 0, FAR, metres).reshape(ROWS, COLUMNS) / stretch
-        return np.minimum(with_people(depth, camera, play.crowd.places, play.floor), FAR).astype(np.float32)
+        return np.minimum(with_people(depth, camera, play.crowd.places), FAR).astype(np.float32)
 
 
 class Seeing(gymnasium.Wrapper):

@@ -170,7 +170,7 @@ class ContinuousTrajectory(Trajectory):
     actions: tuple[int, ...]
     collisions: int
     people: np.ndarray
-    """(n + 1, people, 2) metres."""
+    """(n + 1, people, 3) metres, on the floor."""
     contact: bool
     """It ended by touching somebody."""
 
@@ -233,7 +233,7 @@ class ContinuousEnv:
             raise ValueError(f"an action should be a number from 0 to {self.body.actions - 1}, got {action!r}")
         if self.ended:
             raise RuntimeError("the episode is over; reset before another action")
-        self.collided, before = False, self.position
+        self.collided, before = False, self.ground.world(self.position)
         if action == HabitatAction.FORWARD:
             there = self.after(self.yaw)
             short = self.body.forward - float(np.linalg.norm(there - self.position))
@@ -249,7 +249,7 @@ class ContinuousEnv:
         if self.episode.people and action != HabitatAction.STOP:
             steps = action == HabitatAction.FORWARD
             seconds = self.body.forward / PACE if steps else math.radians(self.body.turn) / SPIN
-            self.contact = self.crowd.go_on(seconds, before, self.position) < CONTACT
+            self.contact = self.crowd.go_on(seconds, before, self.ground.world(self.position)) < CONTACT
         self._people.append(self.crowd.places)
         self._actions.append(int(action))
         self._poses.append((*self.position, self.yaw, self.tilt))
@@ -286,7 +286,8 @@ class ContinuousEnv:
     @property
     def is_following(self) -> bool:
         """True where it faces the first of the people from the right distance."""
-        return bool(follows(self.position[None], np.array([self.yaw]), self.crowd.places[:1, :2])[0])
+        here = self.ground.world(self.position[None])
+        return bool(follows(here, np.array([self.yaw]), self.crowd.places[:1, :3])[0])
 
     @property
     def steps(self) -> int:
@@ -299,7 +300,7 @@ class ContinuousEnv:
         positions = self.ground.world(poses[:, :2])
         metres = np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))
         way: dict[str, Any] = {"positions": positions, "yaws": poses[:, 2], "pitches": poses[:, 3].astype(int)}
-        way |= {"people": np.array(self._people)[..., :2], "contact": self.contact}
+        way |= {"people": np.array(self._people)[..., :3], "contact": self.contact}
         return ContinuousTrajectory(
             rule=SuccessRule(self.episode.radius, strict=True),
             distances=np.array(self._distances[first:]),
@@ -311,16 +312,16 @@ class ContinuousEnv:
 
 
 def follows(positions: np.ndarray, yaws: np.ndarray, person: np.ndarray) -> np.ndarray:
-    """(n,) bool: whether a body at (n, 2+) faces a person at (n, 2) from a distance in FOLLOWS."""
-    to = person - positions[:, :2]
-    metres, ahead = np.hypot(*to.T), to[:, 0] * np.cos(yaws) + to[:, 1] * np.sin(yaws)
+    """(n,) bool: whether a body at (n, 3) faces a person at (n, 3) from a distance in FOLLOWS."""
+    to = person - positions
+    metres, ahead = np.linalg.norm(to, axis=1), to[:, 0] * np.cos(yaws) + to[:, 1] * np.sin(yaws)
     return (metres >= FOLLOWS[0]) & (metres <= FOLLOWS[1]) & (ahead > FACING * metres)
 
 
 def social_measures(t: ContinuousTrajectory, steps: int) -> dict[str, float]:
     """Measures of an episode among people: those of Falcon's evaluator or, where somebody is followed, of Habitat 3's,
     whose distances are along the floor and not straight. Then success is to follow for a share FOLLOWED of `steps`."""
-    metres = np.linalg.norm(t.people[1:] - t.positions[1:, None, :2], axis=2)
+    metres = np.linalg.norm(t.people[1:] - t.positions[1:, None], axis=2)
     measures = {"human_collision": float(t.contact), "psc": float((metres >= PERSONAL).all(1).mean())}
     if not t.episode.follows:
         least = t.shortest / TIMELY

@@ -232,8 +232,8 @@ class ContinuousGymEnv(LiveEnv):
 
     def _seen(self) -> World:
         """The house with the doors that were pushed, and the people."""
-        world = self.dataset.world(self.play.episode.world).with_doors(dict.fromkeys(self.play.pushed, 1.0))
-        return among(world, self.play.crowd)
+        world = self.dataset.world(self.play.episode.world)
+        return among(world, self.play.crowd, dict.fromkeys(self.play.pushed, 1.0))
 
     def _facts(self) -> dict[str, Any]:
         play = self.play

@@ -25,6 +25,7 @@ from embodied.kinds.plugins import Registry
 from embodied.language.plain_language import with_article
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.navigation.free_space import EYE
+from embodied.people.errands import Walks
 from embodied.people.strolls import Crowd, draw_strolls
 from embodied.render.camera import Camera, camera_at
 from embodied.scene.doors import openness
@@ -153,11 +154,12 @@ class Driving:
         self.world = self.worlds[name]
         if name not in self._stages:
             house = self.world.house
-            self._stages[name] = Driver(house, self.world.catalogue), FloorWays(house, stairs=False)
+            walks = Walks(house) if self.settings.people else None
+            self._stages[name] = Driver(house, self.world.catalogue), FloorWays(house, stairs=False), walks
         self._stages.move_to_end(name)
         if len(self._stages) > KEPT:
             self.worlds[self._stages.popitem(last=False)[0]].close()
-        self.driver, self._ground = self._stages[name]
+        self.driver, self._ground, walks = self._stages[name]
         start = self._draw(rng)
         x, y = self._ground.xy[start]
         height = self.world.house.storeys[0].elevation + EYE
@@ -170,7 +172,7 @@ class Driving:
         self.collisions: list[str] = []
         self.touched, self.respectful, people = False, list[bool](), self.settings.people
         count = int(rng.integers(1, people + 1)) if people else 0
-        self.crowd = Crowd(draw_strolls(self.world.house, self._ground, count, (x, y), rng=rng))
+        self.crowd = Crowd(draw_strolls(walks, count, self._here, rng=rng) if walks else ())
         self.ended: str | None = None
         """'reached', 'said', 'contact' or 'limit'; None while it goes on."""
         self._wide: DrivingWays | None = None
@@ -193,7 +195,7 @@ class Driving:
             raise RuntimeError(f"the episode is over ({self.ended}); reset before another step")
         command = np.clip(command, -1.0, 1.0)
         periods = max(1, round(self.settings.control / CONTROL))
-        here = self.driver.position
+        here = self._here
         rolled = self.driver.roll(FASTEST * command[0], TURNING * command[1], periods)
         self.metres += rolled.metres
         self.seconds += periods * CONTROL
@@ -202,7 +204,7 @@ class Driving:
         before, self._left = self._left, self.left
         self._distances.append(self.task.distance(self))
         self._lengths.append(self.metres)
-        came, there = self.crowd.go_on(periods * CONTROL, here, self.driver.position), self.is_there
+        came, there = self.crowd.go_on(periods * CONTROL, here, self._here), self.is_there
         self.respectful.append(came >= PERSONAL)
         if contact := came < CONTACT:
             self.ended = "contact"
@@ -223,6 +225,11 @@ class Driving:
         rule, stopped = SuccessRule(self.goal.radius), self.ended in ("reached", "said")
         distances, lengths = np.array(self._distances), np.array(self._lengths)
         return Trajectory(rule=rule, distances=distances, lengths=lengths, shortest=self.shortest, stopped=stopped)
+
+    @property
+    def _here(self) -> np.ndarray:
+        """(3,) the body's centre on the floor, metres, world."""
+        return np.append(self.driver.position, self.world.house.storeys[0].elevation)
 
     @property
     def left(self) -> float:
@@ -256,7 +263,7 @@ class Driving:
         """The house with the doors that were pushed, to a tenth, and the people."""
         driver = self.driver
         ways = {d: round(x, 1) for d, x in openness(driver.model, driver.data).items()}
-        return among(self.world.with_doors(ways), self.crowd)
+        return among(self.world, self.crowd, ways)
 
     def camera(self) -> Camera:
         """The body's eye as it is now, upright."""

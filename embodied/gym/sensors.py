@@ -75,7 +75,7 @@ def live_pixels(
     Args:
       size: height and width, pixels.
       observations: some of PIXELS; of nothing, nothing is drawn.
-      people: (n, 2+) places of people of the ground floor, who stand in the depth of unlit houses as cylinders.
+      people: (n, 3+) places of people, who stand in the depth of unlit houses as cylinders.
     """
     if not observations:
         return {}
@@ -88,26 +88,32 @@ def live_pixels(
     else:
         depth, whole["ids"] = world.renderer.depth_and_ids(camera, size)
     if people is not None and world.pictures.quality is None:
-        depth = with_people(depth, camera, people, world.house.storeys[0].elevation)
+        depth = with_people(depth, camera, people)
     whole["depth"] = np.minimum(depth, np.float32(FAR))
     return {name: np.ascontiguousarray(whole[name]) for name in observations}
 
 
-def among(world: World, crowd: Crowd) -> World:
-    """The world, in which, where it is lit, people are drawn where they are now."""
-    if world.pictures.quality is not None and (len(crowd.clocks) or world.moment.people):
-        world.show(dataclasses.replace(world.moment, people=crowd.figures), slack=3 * SLACK)
+def among(world: World, crowd: Crowd, ways: Mapping[str, float]) -> World:
+    """The world with doors open as far as `ways` and people have them, to a tenth where it is unlit; where it is lit,
+    people are drawn where they are now."""
+    doors = {**ways, **crowd.openness}
+    if world.pictures.quality is None:
+        return world.with_doors({d: round(x, 1) for d, x in doors.items()})
+    world = world.with_doors(ways)
+    if len(crowd.clocks) or world.moment.people:
+        world.show(dataclasses.replace(world.moment, openness=doors, people=crowd.figures), slack=3 * SLACK)
     return world
 
 
-def with_people(depth: np.ndarray, camera: Camera, places: np.ndarray, floor: float) -> np.ndarray:
-    """A depth picture (h, w), metres along the optical axis, in which people at (n, 2+) metres stand as cylinders."""
+def with_people(depth: np.ndarray, camera: Camera, places: np.ndarray) -> np.ndarray:
+    """A depth picture (h, w), metres along the optical axis, in which people at (n, 3+) metres stand as cylinders."""
     h, w = depth.shape
     tall, depth = math.tan(camera.vfov / 2) / h, depth.copy()
     across, up = np.meshgrid(tall * (2 * np.arange(w) + 1 - w), tall * (h - 1 - 2 * np.arange(h)))
     rays = camera.forward + across[..., None] * camera.right + up[..., None] * np.array(camera.up)
     square, eye = (rays[..., :2] ** 2).sum(-1), np.array(camera.position)
-    for to in places[:, :2] - eye[:2]:
+    for x, y, floor in places[:, :3]:
+        to = np.array([x, y]) - eye[:2]
         middle = rays[..., :2] @ to
         chord = middle**2 - square * (to @ to - PERSON_RADIUS**2)
         near = (middle - np.sqrt(np.maximum(chord, 0.0))) / square

@@ -1,6 +1,6 @@
 """A day of a household: who is where at which hour, doing what, and the walks between, through doors; or one errand.
 
-One person walks at a time; the others wait until the way is free. Days are on the ground floor.
+One person walks at a time; the others wait until the way is free.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from shapely.affinity import translate
 
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import read_toml
@@ -25,11 +26,11 @@ from embodied.house.house import House, Placement
 from embodied.house.household import household_of
 from embodied.house.moment import WIDEST, Moment, MovingPerson, RigidPose, Triple
 from embodied.house.shapes import footprint, inward
-from embodied.navigation.floor_ways import FloorWays
-from embodied.navigation.free_space import HEAD, LOW, closed_doors, leaves, opened
-from embodied.navigation.graph import AGENT_RADIUS, walkable
+from embodied.navigation.floor_ways import APART
+from embodied.navigation.free_space import HEAD, LOW, leaves
+from embodied.navigation.graph import AGENT_RADIUS
 from embodied.people import errands
-from embodied.people.errands import BODY_GAP, ErrandLeg, Swing, legs_along
+from embodied.people.errands import BODY_GAP, ErrandLeg, Walks, legs_along
 from embodied.people.gait import Limbs, between, sitting, smooth, solved
 from embodied.seeds import stream
 
@@ -54,7 +55,8 @@ class DaySpot:
 
     activity: str
     thing: str
-    stand: tuple[float, float]
+    stand: Triple
+    """On the floor, metres, world."""
     heading: float
     seat: Triple | None = None
     bed: Triple | None = None
@@ -67,14 +69,14 @@ class DaySpot:
 
     @property
     def places(self) -> list[np.ndarray]:
-        """(2,) where the body of somebody here may be, first where it stands up."""
+        """(3,) where the body of somebody here may be, on the floor, first where it stands up."""
         if self.bed or not self.seat:
             return [np.array(self.stand)]
-        seat = np.array(self.seat[:2])
-        return [np.array(self.stand), seat, seat + 0.45 * np.array([math.cos(self.front), math.sin(self.front)])]
+        seat = np.array([*self.seat[:2], self.stand[2]])
+        return [np.array(self.stand), seat, seat + 0.45 * np.array([math.cos(self.front), math.sin(self.front), 0.0])]
 
 
-NOWHERE = DaySpot("out", "", (0.0, 0.0), 0.0)
+NOWHERE = DaySpot("out", "", (0.0, 0.0, 0.0), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,10 +120,10 @@ class Day:
         return {n: own[bisect.bisect(own, now, key=lambda p: p.begin) - 1] for n, own in self.pieces.items()}
 
     def _figure(self, person: Person, p: Piece, now: float) -> MovingPerson:
-        limbs, spot, floor = Limbs(person), p.spot, self.house.storeys[0].elevation
+        limbs, spot = Limbs(person), p.spot
         done = min((now - p.begin) / max(p.end - p.begin, 1e-9), 1.0)
         settled = p.settled[0] + (p.settled[1] - p.settled[0]) * done
-        b = p.leg.bearing(now) if p.leg else limbs.standing(np.array([*spot.stand, floor]), spot.heading)
+        b = p.leg.bearing(now) if p.leg else limbs.standing(np.array(spot.stand), spot.heading)
         if spot.seat is not None and settled > 0:
             b = sitting(limbs, b, np.array(spot.seat), spot.heading if spot.bed else spot.front, min(settled, 1.0))
         place, pose = solved(limbs, b)
@@ -185,20 +187,18 @@ def day_of(house: House, catalogue: Catalogue, *, seed: int) -> Day:
 def errand(
     house: House, person: Person, start: Sequence[float], goal: Sequence[float], seat: Sequence[float] | None = None
 ) -> Day:
-    """The day of one person, by id, who goes from second 0 on over the ground floor between the free places nearest to
-    (x, y) points, away from things where there is room, and onto a seat beside the goal: x, y and z of the middle of
-    what is sat on, and the heading of its front."""
-    rest = opened(house, closed_doors(house))
-    ways = FloorWays(rest, stairs=False)
-    swings = [Swing(house, o) for o in house.openings if o.id in closed_doors(house)]
-    swept = shapely.union_all([s.area for s in swings])
-    free = np.flatnonzero(~shapely.intersects_xy(swept, *ways.xy.T))  # nobody stands in the way of a leaf
-    begin, end = (int(free[np.linalg.norm(ways.xy[free] - p, axis=1).argmin()]) for p in (start[:2], goal[:2]))
-    line = errands.smooth_line(ways.xy[ways.wide_ways(np.array([end])).cells(begin)], walkable(rest))
+    """The day of one person, by id, who goes from second 0 on between the free places nearest to (x, y) points of the
+    ground floor or (x, y, z) of any, away from things where there is room, and onto a seat beside the goal: x, y and z
+    of the middle of what is sat on, and the heading of its front."""
+    walks = Walks(house)
+    ground, free = walks.ground, np.flatnonzero(walks.clear)
+    points = (p if len(p) < 3 else ground.plane(np.array(p)) for p in (start, goal))
+    begin, end = (int(free[np.linalg.norm(ground.xy[free] - p, axis=1).argmin()]) for p in points)
+    line = walks.line(ground.xy[ground.wide_ways(np.array([end])).cells(begin)])
     sits, front = (None, None) if seat is None else ((seat[0], seat[1], seat[2]), seat[3])
-    legs, doors = legs_along(Limbs(person), ways.world(line), swings, turned=(None, front))
-    _, heading = legs[-1].course.body(math.inf)
-    spot = DaySpot("", "", (line[-1, 0], line[-1, 1]), heading, sits, front=front or 0.0)
+    legs, doors = legs_along(Limbs(person), line, walks.swings, walks.climbs, turned=(None, front))
+    (x, y, z), heading = legs[-1].course.body(math.inf)
+    spot = DaySpot("", "", (x, y, z), heading, sits, front=front or 0.0)
     pieces = [Piece(leg.begin, leg.end, spot, leg=leg) for leg in legs]
     pieces.append(Piece(legs[-1].end, legs[-1].end + SETTLING[spot.settled], spot, (0.0, spot.settled)))
     pieces.append(Piece(pieces[-1].end, 86400.0, spot, (spot.settled, spot.settled)))
@@ -210,20 +210,18 @@ class _Planner:
 
     def __init__(self, house: House, catalogue: Catalogue, figures: Mapping[str, Person], seed: int) -> None:
         self.house, self.assets, self.figures, self.seed = house, catalogue.assets, figures, seed
-        rest = opened(house, closed_doors(house))
-        self.ways, floor = FloorWays(rest, stairs=False), house.storeys[0].elevation
-        rooms = {r.id for r in house.rooms if r.storey == 0}
-        things = [p for p in house.placements if p.room in rooms]
-        solid = [p for p in things if floor + LOW - p.size[2] < p.position[2] < floor + HEAD]
-        self.footprints = {p.id: footprint(p) for p in solid}
-        self.swings = [Swing(house, o) for o in house.openings if o.id in closed_doors(house) or o.kind == "front_door"]
-        self.swept = shapely.union_all([s.area for s in self.swings])
-        self.spots = [s for p in things for s in self._spots(p)]
-        self.space = walkable(rest)
-        for o in (s.opening for s in self.swings if s.opening.kind == "front_door"):
+        self.walks = Walks(house)
+        self.ways, self.space = self.walks.ground, self.walks.ground.space
+        self.floors = {r.id: (r.storey, house.storeys[r.storey].elevation) for r in house.rooms}
+        floor = lambda p: self.floors[p.room][1]
+        solid = [p for p in house.placements if floor(p) + LOW - p.size[2] < p.position[2] < floor(p) + HEAD]
+        self.footprints = {p.id: translate(footprint(p), self.floors[p.room][0] * APART) for p in solid}
+        self.spots = [s for p in house.placements for s in self._spots(p)]
+        for o in (o for o in house.openings if o.kind == "front_door"):
             middle, into = (np.array(o.a) + o.b) / 2, inward(house, o)
             x, y = (middle - 0.75 * into).tolist()
-            self.spots.append(DaySpot("out", o.id, (x, y), math.atan2(into[1], into[0])))
+            out = x, y, house.floor_height(o)
+            self.spots.append(DaySpot("out", o.id, out, math.atan2(into[1], into[0])))
             leaf = shapely.union_all(leaves(house, dataclasses.replace(o, angle=WIDEST))).buffer(AGENT_RADIUS + 0.01)
             way = shapely.LineString([middle + 0.4 * into, (x, y)]).buffer(0.05)
             self.space = self.space.union(way).difference(leaf)
@@ -282,25 +280,27 @@ class _Planner:
             elif p.object_class not in SEATS and (stand := self._stand(p, _world(p, 0.0, -depth / 2), False)):
                 yield DaySpot(activity, p.id, stand, math.atan2(p.position[1] - stand[1], p.position[0] - stand[0]))
 
-    def _stand(self, p: Placement, goal: tuple[float, float], sits: bool) -> tuple[float, float] | None:
+    def _stand(self, p: Placement, goal: tuple[float, float], sits: bool) -> Triple | None:
         """The nearest free place to a point of a thing, before it or beside it, with nothing between."""
+        goal = goal[0] + self.floors[p.room][0] * APART, goal[1]
         away, front = self.ways.xy - goal, facing_of(p.yaw)
         far = np.linalg.norm(away, axis=1)
         before = away @ (math.cos(front), math.sin(front)) > -0.4 * far
-        here = (far < SPOT_REACH) & (self.ways.room_of_cell == p.room)
+        here = (far < SPOT_REACH) & (self.ways.room_of_cell == p.room) & self.walks.clear
         which = np.flatnonzero(here & (before | (p.object_class in BEDS)))
         point = shapely.Point(goal)
         others = [o for i, o in self.footprints.items() if i != p.id and not o.buffer(0.02).contains(point)]
         barred = shapely.union_all(others) if sits else shapely.Point()
-        for x, y in self.ways.xy[which[np.argsort(far[which], kind="stable")]].tolist():
-            way = shapely.LineString([(x, y), goal])
-            if not shapely.intersects_xy(self.swept, x, y) and not way.dwithin(barred, 0.1):
-                return x, y
+        for cell in which[np.argsort(far[which], kind="stable")]:
+            if not shapely.LineString([self.ways.xy[cell], goal]).dwithin(barred, 0.1):
+                x, y, z = self.ways.xyz[cell].tolist()
+                return x, y, z
         return None
 
     def _line(self, name: str, here: DaySpot, there: DaySpot) -> np.ndarray | None:
-        """(m, 2) points of the way between two spots past everybody else; None where there is none."""
-        others = shapely.MultiPoint([p for s in self._others(name) for p in s.places[s.seat is not None :]])
+        """(m, 3) points of the way between two spots past everybody else; None where there is none."""
+        places = [p for s in self._others(name) for p in s.places[s.seat is not None :]]
+        others = shapely.MultiPoint(self.ways.plane(np.array(places).reshape(-1, 3)))
         shut = shapely.dwithin(shapely.points(self.ways.xy), others, BODY_GAP + errands.WAY_STEP)
         if "out" in (here.activity, there.activity):
             shut |= ~shapely.intersects_xy(self.space, *self.ways.xy.T)
@@ -308,16 +308,16 @@ class _Planner:
         ways = self.ways.wide_ways(np.array([end]), shut)
         if shut[end] or not np.isfinite(ways.metres[start]):
             return None
-        return errands.smooth_line(
-            np.concatenate([before[::-1], self.ways.xy[ways.cells(start)], after]), self.space, others
-        )
+        way = np.concatenate([before[::-1], self.ways.xy[ways.cells(start)], after])
+        return self.walks.line(way, self.space, others)
 
     def _ends(self, spot: DaySpot) -> tuple[int, np.ndarray]:
         """The cell that a way to a spot ends at, and (k, 2) points that it goes on to, out of the front door."""
         inside = np.array(spot.stand)
         if spot.activity == "out":
-            inside += 1.15 * np.array([math.cos(spot.heading), math.sin(spot.heading)])
-        return self.ways.cell_at(inside), np.array([inside, spot.stand])[spot.activity != "out" :]
+            inside += 1.15 * np.array([math.cos(spot.heading), math.sin(spot.heading), 0.0])
+        after = self.ways.plane(np.array([inside, spot.stand])[spot.activity != "out" :])
+        return self.ways.cell_at(inside), after
 
     def _walk(self, name: str, here: DaySpot, there: DaySpot, line: np.ndarray, when: float) -> None:
         """Get up, go along a line, through doors, and settle."""
@@ -327,7 +327,7 @@ class _Planner:
         if here.settled:
             add(when + SETTLING[here.settled], here, (here.settled, 0.0))
         limbs, turned = Limbs(self.figures[name]), (here.heading, there.heading)
-        legs, doors = legs_along(limbs, self.ways.world(line), self.swings, own[-1].end, turned)
+        legs, doors = legs_along(limbs, line, self.walks.swings, self.walks.climbs, own[-1].end, turned)
         for leg in legs[1:]:
             add(leg.end, there, (0.0, 0.0), leg)
         self.doors += doors

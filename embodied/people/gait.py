@@ -35,6 +35,8 @@ PACE, EASE = 1.15, 0.5
 """Leg lengths a second (a grown person: 1 m/s), and seconds from standing to walking and back."""
 TURN_METRES, TURN_STEP, TURN_PACE = 0.35, 0.8, 0.45
 """Metres that a radian of turning on the spot counts as, radians of one step of it, and metres a second."""
+SWAY = 0.012
+"""Metres that the pelvis sways from its way at most (recorded: 0.02), so that who walks keeps to the free floor."""
 FLAT_FOOT, FOOT_CLEARANCE = 0.05, 0.025
 """Pitch of a foot, radians, below which it stands flat, and leg lengths of its sole above the ground in the air."""
 BALL, HEEL = 0.15, 0.055
@@ -111,7 +113,7 @@ class Limbs:
                 turned = w * cycle(bone, (phase + k / 2) % 1) + (1 - w) * np.array(still)
                 turns[f"{side}_{bone}"] = turned * (1, 1 - 2 * k, 1 - 2 * k)
         *flat, up = w * self.leg * cycle("offset", phase)
-        away = rotation(yaw_facing(heading)) @ flat
+        away = rotation(yaw_facing(heading)) @ flat * min(1.0, SWAY / max(math.hypot(*flat), 1e-9))
         return Bearing(position + [*away, 0.0], heading, feet, float(up), turns)
 
 

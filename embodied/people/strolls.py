@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,11 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.assets.people import people
-from embodied.house.house import House
 from embodied.house.household import residents
-from embodied.house.moment import MovingPerson
-from embodied.navigation.floor_ways import FloorWays
-from embodied.people.errands import WAY_STEP, ErrandLeg, legs_along, smooth_line
+from embodied.house.moment import MovingPerson, Triple
+from embodied.people.errands import WAY_STEP, Climb, ErrandLeg, Swing, Walks, legs_along, on_stair, openness
 from embodied.people.gait import Limbs, solved
 
 PERSON_RADIUS, PERSON_HEIGHT, ABOUT, SHORTEST = 0.25, 1.7, 1.5, 3.0
@@ -28,12 +27,16 @@ class Stroll:
 
     person: str
     """One of assets.people."""
-    way: tuple[tuple[float, float, float], ...]
+    way: tuple[Triple, ...]
     """Metres, world, on the ground."""
     pause: float
     """Seconds of standing at each end, the turn included."""
     begin: float = 0.0
     """Seconds of the round trip that are over when an episode begins."""
+    swings: tuple[Swing, ...] = ()
+    """Doors on the way, which they open and close."""
+    climbs: tuple[Climb, ...] = ()
+    """Stairs on the way."""
 
 
 class Walker:
@@ -41,35 +44,36 @@ class Walker:
 
     def __init__(self, stroll: Stroll) -> None:
         self.person, self._limbs, self._begin = stroll.person, Limbs(people()[stroll.person]), stroll.begin
-        self._legs, way = list[tuple[float, ErrandLeg]](), np.array(stroll.way)
+        self._legs, doors, way = list[ErrandLeg](), list[tuple[str, float, float]](), np.array(stroll.way)
         metres = np.cumsum([0.0, *np.linalg.norm(np.diff(way, axis=0), axis=1)])
         every = np.linspace(0, metres[-1], max(2, int(metres[-1] / WAY_STEP) + 1))
-        line = np.column_stack([np.interp(every, metres, c) for c in way.T])
-        for there, back in ((line, line[-2]), (line[::-1], line[1])):
-            turned = math.atan2(*(back - there[-1])[1::-1])
-            legs, _ = legs_along(self._limbs, there, (), turned=(None, turned))
-            long = [leg.end - leg.begin for leg in legs]
-            self._legs += zip([*long[:-1], max(long[-1], stroll.pause)], legs)
-        self.seconds = sum(s for s, _ in self._legs)
+        line, self.seconds = np.column_stack([np.interp(every, metres, c) for c in way.T]), 0.0
         """Of a round trip."""
+        for there, back in ((line, line[-2]), (line[::-1], line[1])):
+            turned = None, math.atan2(*(back - there[-1])[1::-1])
+            legs, opened = legs_along(self._limbs, there, stroll.swings, stroll.climbs, self.seconds, turned)
+            self._legs += legs
+            self.seconds = max(legs[-1].end, legs[-1].begin + stroll.pause)
+            doors += opened
+        self._doors = [(i, a - k, b - k) for k in (0.0, self.seconds) for i, a, b in doors]
 
-    def place(self, seconds: float) -> tuple[float, float, float]:
-        """x and y, metres, world, and heading, radians."""
-        leg, since = self._leg(seconds)
-        at, heading = leg.course.body(leg.course.walked(since))
-        return float(at[0]), float(at[1]), heading
+    def place(self, seconds: float) -> tuple[float, float, float, float]:
+        """x, y and z, metres, world, and heading, radians."""
+        (x, y, z), heading = self._leg(seconds).place(self._since(seconds))
+        return float(x), float(y), float(z), heading
 
     def figure(self, seconds: float) -> MovingPerson:
-        leg, since = self._leg(seconds)
-        return MovingPerson(self.person, *solved(self._limbs, leg.course.at(since)))
+        return MovingPerson(self.person, *solved(self._limbs, self._leg(seconds).bearing(self._since(seconds))))
 
-    def _leg(self, seconds: float) -> tuple[ErrandLeg, float]:
-        since = (seconds + self._begin) % self.seconds
-        for long, leg in self._legs[:-1]:
-            if since < long:
-                return leg, since
-            since -= long
-        return self._legs[-1][1], since
+    def openness(self, seconds: float) -> dict[str, float]:
+        """How far doors are open that are closed at rest."""
+        return openness(self._doors, self._since(seconds))
+
+    def _since(self, seconds: float) -> float:
+        return (seconds + self._begin) % self.seconds
+
+    def _leg(self, seconds: float) -> ErrandLeg:
+        return self._legs[bisect.bisect(self._legs, self._since(seconds), key=lambda leg: leg.begin) - 1]
 
 
 class Crowd:
@@ -79,18 +83,18 @@ class Crowd:
         """`polite`: they stand while somebody is within ABOUT before them; otherwise they see nobody."""
         self._walkers, self._polite = [Walker(s) for s in strolls], polite
         self.clocks = np.zeros(len(strolls))
-        self.places = np.array([w.place(0.0) for w in self._walkers]).reshape(-1, 3)
-        """(n, 3) x and y, metres, world, and heading, radians."""
+        self.places = np.array([w.place(0.0) for w in self._walkers]).reshape(-1, 4)
+        """(n, 4) x, y and z, metres, world, and heading, radians."""
 
     def go_on(self, seconds: float, begin: np.ndarray, end: np.ndarray) -> float:
-        """Let time pass, in which somebody goes straight from (x, y) to another place; returns how near, metres, the
+        """Let time pass, in which somebody goes straight from (x, y, z) to another place; returns how near, metres, the
         middles of the two nearest bodies come."""
-        before, to = self.places, begin - self.places[:, :2]
-        ahead = (to * np.stack([np.cos(before[:, 2]), np.sin(before[:, 2])], 1)).sum(1)
-        waits = self._polite & (np.hypot(*to.T) < ABOUT) & (ahead > 0)
+        before, to = self.places, begin - self.places[:, :3]
+        ahead = (to[:, :2] * np.stack([np.cos(before[:, 3]), np.sin(before[:, 3])], 1)).sum(1)
+        waits = self._polite & (np.linalg.norm(to, axis=1) < ABOUT) & (ahead > 0)
         self.clocks = self.clocks + np.where(waits, 0.0, seconds)
-        self.places = np.array([w.place(t) for w, t in zip(self._walkers, self.clocks)]).reshape(-1, 3)
-        way = (self.places - before)[:, :2] - (end - begin)
+        self.places = np.array([w.place(t) for w, t in zip(self._walkers, self.clocks)]).reshape(-1, 4)
+        way = (self.places - before)[:, :3] - (end - begin)
         share = np.clip((to * way).sum(1) / np.maximum((way * way).sum(1), 1e-12), 0.0, 1.0)
         return float(np.linalg.norm(to - share[:, None] * way, axis=1).min(initial=math.inf))
 
@@ -99,15 +103,17 @@ class Crowd:
         """Everybody as they are now, by person: `Moment.people`."""
         return {w.person: w.figure(t) for w, t in zip(self._walkers, self.clocks)}
 
+    @property
+    def openness(self) -> dict[str, float]:
+        """How far doors are open that are closed at rest: `Moment.openness`."""
+        return {i: x for w, t in zip(self._walkers, self.clocks) for i, x in w.openness(t).items()}
 
-def draw_strolls(
-    house: House, ground: FloorWays, count: int, start: Sequence[float], *, rng: np.random.Generator
-) -> tuple[Stroll, ...]:
-    """`count` of those who live in a house, and visitors where these are fewer, who walk between rooms of the ground
-    floor, begin away from (x, y) `start` and keep apart; fewer where there is no room for that."""
-    times, others, strolls = np.arange(0.0, TOGETHER, 0.5), list[np.ndarray](), list[Stroll]()
-    inside = np.flatnonzero((ground.room_of_cell != "") & (ground.xyz[:, 2] == house.storeys[0].elevation))
-    at_home = {p.id for p in residents(house)}
+
+def draw_strolls(walks: Walks, count: int, start: Sequence[float], *, rng: np.random.Generator) -> tuple[Stroll, ...]:
+    """`count` of those who live in a house, and visitors where these are fewer, who walk between rooms, begin away from
+    (x, y, z) `start` and keep apart, also from each other's doors; fewer where there is no room for that."""
+    times, others, strolls, ground = np.arange(0.0, TOGETHER, 0.5), list[np.ndarray](), list[Stroll](), walks.ground
+    inside, at_home = np.flatnonzero(walks.clear), {p.id for p in residents(walks.house)}
     known = [*rng.permutation(sorted(at_home)), *rng.permutation(sorted(people().keys() - at_home))]
     for person in map(str, known[:count]):
         for _ in range(TRIES):
@@ -116,13 +122,18 @@ def draw_strolls(
             ways = ground.wide_ways(np.array([b]))
             if ground.room_of_cell[a] == ground.room_of_cell[b] or not SHORTEST < ways.metres[a] < math.inf:
                 continue
-            line = smooth_line(ground.xyz[ways.cells(a), :2], ground.space)
-            floor, points = float(house.storeys[0].elevation), np.round([*line[:-1:4], line[-1]], 3).tolist()
-            stroll = Stroll(person, tuple((x, y, floor) for x, y in points), *seconds)
+            line = walks.line(ground.xy[ways.cells(a)])
+            points = np.round([*line[:-1:4], line[-1]], 3)
+            swings = tuple(s for s in walks.swings if s.stop(line) is not None)
+            climbs = tuple(c for c in walks.climbs if on_stair(line, c))
+            stroll = Stroll(person, tuple((x, y, z) for x, y, z in points.tolist()), *seconds, swings, climbs)
             walker = Walker(stroll)
-            if math.dist(walker.place(0.0)[:2], start[:2]) < ABOUT:
+            if math.dist(walker.place(0.0)[:3], start) < ABOUT:
                 continue
-            track = np.array([walker.place(t)[:2] for t in times])
+            track = np.array([walker.place(t)[:3] for t in times])
+            met = any(s.meets(x).any() for x in others for s in swings)
+            if met or any(s.meets(track).any() for x in strolls for s in x.swings):
+                continue
             if all(np.linalg.norm(track - x, axis=1).min() > 2 * PERSON_RADIUS for x in others):
                 strolls.append(stroll)
                 others.append(track)

@@ -10,10 +10,13 @@ from embodied.gym.continuous_tasks.social import social_source
 
 
 def follow_source(source: EpisodeSource) -> list[ContinuousEpisode]:
-    """The episodes of SocialNav, in which the first of the people is followed."""
-    words = "find the person and stay 1 to 2 m away, facing them"
-    first = lambda e: {"goals": (NavigationGoal(e.people[0].way[0]),), "people": e.people[:1]}
-    return [dataclasses.replace(e, instruction=words, follows=True, **first(e)) for e in social_source(source)]
+    """The episodes of SocialNav, in which the first of the people who need no closed door is followed."""
+    words, episodes = "find the person and stay 1 to 2 m away, facing them", []
+    for e in social_source(source):
+        for person in [p for p in e.people if not p.swings][:1]:
+            how = {"goals": (NavigationGoal(person.way[0]),), "people": (person,), "follows": True}
+            episodes.append(dataclasses.replace(e, instruction=words, **how))
+    return episodes
 
 
 FOLLOWNAV = register_continuous(ContinuousTask("follow", "FollowNav", None, follow_source, gps=True))

@@ -17,20 +17,22 @@ from embodied.envs.base import HelpEnv
 from embodied.envs.continuous import CONTACT, PERSONAL
 from embodied.interface import TURNS, AmongPeople, Pose, Task
 from embodied.kinds import task_kind
-from embodied.navigation.floor_ways import FloorWays
+from embodied.navigation.free_space import EYE
 from embodied.navigation.graph import NavGraph
+from embodied.people.errands import Walks
 from embodied.people.strolls import Crowd, draw_strolls
 from embodied.seeds import stream
 
 POOL, MOST_PEOPLE, STEPS = 640, 3, 40
-FAR, STRIDE = (3.0, 20.0), 0.25
-"""Least and most metres from a start to its goal, and between the places of a move at which people are looked at."""
+FAR, STRIDE, EYES = (3.0, 20.0), 0.25, (0.0, 0.0, EYE)
+"""Least and most metres from a start to its goal, and between the places of a move at which people are looked at; from
+the floor to a viewpoint."""
 
 
 def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.PartTasks:
     """Nothing in a house that is too small."""
     world, graph, house = inputs.world, inputs.world.graph, inputs.world.house
-    level, ground = np.flatnonzero(graph.positions[:, 2] < house.storeys[0].elevation + 2.0), FloorWays(house)
+    level, walks = np.flatnonzero(graph.positions[:, 2] < house.storeys[0].elevation + 2.0), Walks(house)
     metres = np.asarray(graph.distance)[np.ix_(level, level)]
     pairs = level[np.argwhere((metres >= FAR[0]) & (metres <= FAR[1]))]
 
@@ -38,9 +40,9 @@ def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.Par
         name = f"{house.name}/social/{i}"
         rng = stream(inputs.seed, "task", name)
         (start, goal), turn = pairs[int(rng.integers(len(pairs)))].tolist(), int(rng.integers(TURNS))
-        here, there = graph.positions[[start, goal], :2]
-        people = AmongPeople(draw_strolls(house, ground, int(rng.integers(1, MOST_PEOPLE + 1)), here, rng=rng))
-        far, aside = math.dist(here, there), math.atan2(*(there - here)[::-1]) - turn * math.tau / TURNS
+        here, there = graph.positions[[start, goal]] - EYES
+        people = AmongPeople(draw_strolls(walks, int(rng.integers(1, MOST_PEOPLE + 1)), here, rng=rng))
+        far, aside = math.dist(here, there), math.atan2(*(there - here)[1::-1]) - turn * math.tau / TURNS
         words = f"go to the place {far * math.cos(aside):.1f} m ahead and {far * math.sin(aside):.1f} m to the left"
         return Task(name, "social", world.name, Pose(start, turn), people, (goal,), words, 0.0, STEPS)
 
@@ -51,7 +53,7 @@ def approaches(task: Task, graph: NavGraph, nodes: Sequence[int]) -> np.ndarray:
     """(n,) metres to the nearest person along the moves between nodes, STRIDE by STRIDE."""
     assert isinstance(task.goal, AmongPeople), "tasks of this kind"
     crowd, near = Crowd(task.goal.strolls), list[float]()
-    for a, b in pairwise(graph.positions[list(nodes), :2]):
+    for a, b in pairwise(graph.positions[list(nodes)] - EYES):
         way = np.linspace(a, b, math.ceil(math.dist(a, b) / STRIDE) + 1)
         near += [crowd.go_on(math.dist(p, q), p, q) for p, q in pairwise(way)]
     return np.array(near)
