@@ -14,17 +14,20 @@ import shapely
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
+from embodied.assets.people import people
 from embodied.envs.continuous import CONTACT, Body, ContinuousEnv, ContinuousEpisode, NavigationGoal, social_measures
+from embodied.envs.driven import Driver
 from embodied.evaluation.evaluate import agent, play
 from embodied.generate import HouseConfig, generate_house
 from embodied.gym.sensors import with_people
-from embodied.house.moment import WIDEST
+from embodied.house.moment import WIDEST, Moment, MovingPerson
 from embodied.interface import AmongPeople, Task
 from embodied.kinds.shipped.social import SOCIAL, came
 from embodied.kinds.task_kind import EnvInputs, TaskInputs
 from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.free_space import leaves, room_doors
 from embodied.people.errands import Walks
+from embodied.people.gait import Limbs, solved
 from embodied.people.strolls import PERSON_RADIUS, Crowd, Stroll, Walker, draw_strolls
 from embodied.records import from_json, to_json
 from embodied.render.camera import camera_at
@@ -53,7 +56,7 @@ def test_people_keep_to_the_free_floor_and_apart_and_are_the_same_for_the_same_s
     shut = [dataclasses.replace(o, angle=0.0) if o.id in doors else o for o in house.openings]
     walks = Walks(dataclasses.replace(house, openings=tuple(shut)))
     ground, start = walks.ground, walks.ground.xyz[0]
-    draw = lambda seed: draw_strolls(walks, 3, start, rng=np.random.default_rng(seed))
+    draw = lambda seed: draw_strolls(walks, ("mei", "anna", "jun"), start, rng=np.random.default_rng(seed))
     assert draw(1) == draw(1) != draw(2)
     walkers = [Walker(s) for s in draw(1)]
     times = np.arange(0.0, 120.0, 0.5)
@@ -167,7 +170,28 @@ def test_environments_show_people_and_tell_the_measures(world):
     assert {"found", "following"} <= set(follow.step(0)[-1])
     drive = gymnasium.make("embodied/Drive-v0", people=2, **small).unwrapped
     drive.reset(seed=0)
-    crowd = drive.driving.crowd
-    crowd.go_on = lambda *_: 0.0
-    *_, ended, _, info = drive.step(np.zeros(2))
-    assert ended and drive.driving.ended == "contact" and info["human_collision"] == 1.0
+    driving = drive.driving
+    x, y, z, heading = driving.crowd.places[0]
+    ahead = np.array([math.cos(heading), math.sin(heading)])
+    driving.driver.place(np.array([x, y, z + 1.5] + [*(0.6 * ahead), 0]), heading)  # in whose way it stands
+    while driving.ended is None:
+        *_, ended, _, info = drive.step(np.zeros(2))
+    assert ended and driving.ended == "contact" and info["human_collision"] == 1.0
+
+
+def test_a_person_stops_wheels_and_pushes_them_and_opens_the_door_that_they_cannot():
+    shut = Moment(openness={"door_1": 0.0}).applied(furnished(two_rooms()))
+    driver = Driver(shut, HandCatalogue(), [people()["mei"]], ["door_1"])
+    someone, door = solved(limbs := Limbs(people()["mei"]), limbs.standing(np.array([2.0, 2.0, 0.0]), 0.0)), "door_1"
+    stands = Moment(people={"mei": MovingPerson("mei", *someone)})
+    driver.place(np.array([3.0, 2.0, 1.5]), math.pi)
+    driver.stand(stands)
+    assert "mei" in driver.roll(0.6, 0.0, 150, stands).collisions and driver.position[0] > 2.2
+    before = driver.position
+    nearer = solved(limbs, limbs.standing(np.array([2.4, 2.0, 0.0]), 0.0))
+    driver.roll(0.0, 0.0, 50, Moment(people={"mei": MovingPerson("mei", *nearer)}))
+    assert driver.position[0] > before[0] + 0.2
+    for opened, passes in ((0.0, False), (1.0, True)):
+        driver.place(np.array([4.2, 1.05, 1.5]), 0.0)
+        driver.roll(0.6, 0.0, 250, Moment(openness={door: opened}))
+        assert (driver.position[0] > 5.3) == passes

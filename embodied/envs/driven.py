@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,14 +13,16 @@ import mujoco
 import numpy as np
 
 from embodied.geometry import rotation
-from embodied.house.moment import WIDEST
+from embodied.house.moment import WIDEST, Moment
 from embodied.navigation.free_space import ajar_doors
-from embodied.scene.doors import HINGE
+from embodied.scene.doors import HINGE, set_openness
 from embodied.scene.joinery import leaf_poses
 from embodied.scene.model import build_spec, owner_of_name, yaw_quat
+from embodied.scene.people import add_person, stand_people
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
+    from embodied.assets.people import Person
     from embodied.house.house import House
 
 WHEELS = Path(__file__).parent / "wheels.xml"
@@ -52,9 +54,18 @@ class Roll:
 class Driver:
     """Owns the physics of one house with the body in it."""
 
-    def __init__(self, house: House, catalogue: Catalogue) -> None:
-        spec = build_spec(house, catalogue, parts=())
-        for name, hinged in _leaves_ajar(house, catalogue).items():
+    def __init__(
+        self, house: House, catalogue: Catalogue, people: Sequence[Person] = (), doors: Collection[str] = ()
+    ) -> None:
+        """
+        Args:
+          people: who may walk about; their bodies are named as they are.
+          doors: that people open; the body cannot.
+        """
+        spec, self._doors = build_spec(house, catalogue, parts=()), dict.fromkeys(doors, 0.0)
+        for person in people:
+            add_person(spec, person.id, person)
+        for name, hinged in _leaves_on_hinges(house, catalogue, ajar_doors(house) | {*doors}).items():
             for g in [g for g in spec.geoms if owner_of_name(g.name) == name]:
                 _hang(spec, g, *hinged)
         robot = mujoco.MjSpec.from_file(str(WHEELS))
@@ -93,16 +104,18 @@ class Driver:
         mujoco.mj_step(self.model, self.data, 10 * self.substeps)
         self._last_touch = {}
 
-    def roll(self, speed: float, turn: float, periods: int = 1) -> Roll:
+    def roll(self, speed: float, turn: float, periods: int = 1, moment: Moment | None = None) -> Roll:
         """Hold a command for so many control periods.
 
         Args:
           speed, turn: metres and radians per second, as far as the motors can.
+          moment: where people are at the end, and how far doors are open.
         """
         self._command(float(np.clip(speed, -FASTEST, FASTEST)), float(np.clip(turn, -TURNING, TURNING)))
         metres, collisions, touched = 0.0, [], False
-        for _ in range(periods):
+        for k in range(periods):
             before = self.position
+            self.stand(moment or Moment(), 1 / (periods - k))
             mujoco.mj_step(self.model, self.data, self.substeps)
             metres, time = metres + float(np.linalg.norm(self.position - before)), self.data.time
             now = {owner for _, owner in touches(self.model, self.data, self._is_own)}
@@ -110,6 +123,12 @@ class Driver:
             self._last_touch |= dict.fromkeys(now, time)
             touched = touched or bool(now)
         return Roll(metres, tuple(collisions), touched)
+
+    def stand(self, moment: Moment, share: float = 1.0) -> None:
+        """Move people a share of the way to where a moment has them, and the doors that they open."""
+        if self.model.nmocap:
+            stand_people(self.model, self.data, moment, share)
+            set_openness(self.model, self.data, {**self._doors, **moment.openness})
 
     @property
     def eye(self) -> tuple[np.ndarray, np.ndarray]:
@@ -137,24 +156,26 @@ def touches(model: mujoco.MjModel, data: mujoco.MjData, is_own: np.ndarray) -> I
                 yield k, owner
 
 
-def _leaves_ajar(house: House, catalogue: Catalogue) -> dict[str, tuple[np.ndarray, float, float]]:
-    """Hinge, metres, yaw, radians, and how far it turned from being closed, of the leaves that stand ajar, by owner."""
-    poses, ajar = {}, ajar_doors(house)
-    for o in house.openings:
-        if o.id in ajar:
-            shut = leaf_poses(house, dataclasses.replace(o, angle=0.0), catalogue.finish)
-            for name, (hinge, yaw) in leaf_poses(house, o, catalogue.finish).items():
-                poses[owner_of_name(name)] = np.array(hinge), yaw, yaw - shut[name][1]
-    return poses
+def _leaves_on_hinges(
+    house: House, catalogue: Catalogue, doors: Collection[str]
+) -> dict[str, tuple[np.ndarray, float, float, float]]:
+    """Hinge, metres, yaw, radians, and how far it is open and opens, signed, of the leaves of doors, by owner."""
+    out = {}
+    for o in (o for o in house.openings if o.id in doors):
+        poses = lambda angle, o=o: leaf_poses(house, dataclasses.replace(o, angle=angle), catalogue.finish)
+        shut, wide = poses(0.0), poses(WIDEST)
+        for name, (hinge, yaw) in poses(o.angle).items():
+            out[owner_of_name(name)] = np.array(hinge), yaw, yaw - shut[name][1], wide[name][1] - shut[name][1]
+    return out
 
 
-def _hang(spec: mujoco.MjSpec, box: mujoco.MjsGeom, hinge: np.ndarray, yaw: float, turn: float) -> None:
+def _hang(spec: mujoco.MjSpec, box: mujoco.MjsGeom, hinge: np.ndarray, yaw: float, turn: float, opens: float) -> None:
     """Put the box of a leaf on hinges; it meets bodies alone."""
     opening, _, piece = owner_of_name(box.name).partition("/")
     leaf = spec.worldbody.add_body(name=f"{opening}_{piece}", pos=hinge, quat=yaw_quat(yaw))
     limits = {"range": np.degrees([0, WIDEST]), "limited": True, "ref": math.degrees(abs(turn))}
     joint = f"{opening}_{'right' if piece == 'leaf_2' else ''}doorhinge"
-    leaf.add_joint(name=joint, axis=[0, 0, math.copysign(1.0, turn)], **limits, **HINGE)
+    leaf.add_joint(name=joint, axis=[0, 0, math.copysign(1.0, opens)], **limits, **HINGE)
     pos = [*(rotation(-yaw) @ (box.pos - hinge)[:2]), box.pos[2] - hinge[2]]
     facts = {"name": box.name, "type": box.type, "size": box.size.copy(), "pos": pos, "mass": LEAF_MASS}
     spec.delete(box)

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium import spaces
 
+from embodied.assets.people import people
 from embodied.assistants.descriptions import word_number
-from embodied.envs.continuous import CONTACT, PERSONAL
+from embodied.envs.continuous import PERSONAL
 from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver
 from embodied.geometry import wrap
 from embodied.gym.sensors import LARGE, PIXELS, among, check_live, live_pixels
@@ -26,9 +27,10 @@ from embodied.language.plain_language import with_article
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.navigation.free_space import EYE
 from embodied.people.errands import Walks
-from embodied.people.strolls import Crowd, draw_strolls
+from embodied.people.strolls import Crowd, draw_strolls, who_is_about
 from embodied.render.camera import Camera, camera_at
 from embodied.scene.doors import openness
+from embodied.seeds import stream
 from embodied.tasks.goals import NOT_OBJECTS, footprint_distance
 
 if TYPE_CHECKING:
@@ -154,12 +156,15 @@ class Driving:
         self.world = self.worlds[name]
         if name not in self._stages:
             house = self.world.house
-            walks = Walks(house) if self.settings.people else None
-            self._stages[name] = Driver(house, self.world.catalogue), FloorWays(house, stairs=False), walks
+            who = who_is_about(house, self.settings.people, rng=stream(0, "visitors", name))
+            walks, bodies = Walks(house) if who else None, [people()[p] for p in who]
+            doors = [s.door for s in walks.swings] if walks else ()
+            driver = Driver(house, self.world.catalogue, bodies, doors)
+            self._stages[name] = driver, FloorWays(house, stairs=False), walks, who
         self._stages.move_to_end(name)
         if len(self._stages) > KEPT:
             self.worlds[self._stages.popitem(last=False)[0]].close()
-        self.driver, self._ground, walks = self._stages[name]
+        self.driver, self._ground, walks, who = self._stages[name]
         start = self._draw(rng)
         x, y = self._ground.xy[start]
         height = self.world.house.storeys[0].elevation + EYE
@@ -170,9 +175,10 @@ class Driving:
         self.metres = self.seconds = 0.0
         self._distances, self._lengths = [self.task.distance(self)], [0.0]
         self.collisions: list[str] = []
-        self.touched, self.respectful, people = False, list[bool](), self.settings.people
-        count = int(rng.integers(1, people + 1)) if people else 0
-        self.crowd = Crowd(draw_strolls(walks, count, self._here, rng=rng) if walks else ())
+        self.touched, self.respectful = False, list[bool]()
+        about = [str(p) for p in rng.permutation(who)[: rng.integers(1, len(who) + 1)]] if who else []
+        self.crowd = Crowd(draw_strolls(walks, about, self._here, rng=rng) if walks else ())
+        self.driver.stand(self.crowd.moment)
         self.ended: str | None = None
         """'reached', 'said', 'contact' or 'limit'; None while it goes on."""
         self._wide: DrivingWays | None = None
@@ -195,8 +201,9 @@ class Driving:
             raise RuntimeError(f"the episode is over ({self.ended}); reset before another step")
         command = np.clip(command, -1.0, 1.0)
         periods = max(1, round(self.settings.control / CONTROL))
-        here = self._here
-        rolled = self.driver.roll(FASTEST * command[0], TURNING * command[1], periods)
+        self.crowd.go_on(periods * CONTROL, self._here, self._here)
+        moment = self.crowd.moment
+        rolled = self.driver.roll(FASTEST * command[0], TURNING * command[1], periods, moment)
         self.metres += rolled.metres
         self.seconds += periods * CONTROL
         self.collisions += rolled.collisions
@@ -204,9 +211,9 @@ class Driving:
         before, self._left = self._left, self.left
         self._distances.append(self.task.distance(self))
         self._lengths.append(self.metres)
-        came, there = self.crowd.go_on(periods * CONTROL, here, self._here), self.is_there
-        self.respectful.append(came >= PERSONAL)
-        if contact := came < CONTACT:
+        apart, there = np.linalg.norm(self.crowd.places[:, :3] - self._here, axis=1), self.is_there
+        self.respectful.append(bool((apart >= PERSONAL).all()))
+        if contact := not moment.people.keys().isdisjoint(rolled.collisions):
             self.ended = "contact"
         elif command[2] > SAID if self.task.says else there:
             self.ended = "said" if self.task.says else "reached"

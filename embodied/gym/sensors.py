@@ -96,12 +96,12 @@ def live_pixels(
 def among(world: World, crowd: Crowd, ways: Mapping[str, float]) -> World:
     """The world with doors open as far as `ways` and people have them, to a tenth where it is unlit; where it is lit,
     people are drawn where they are now."""
-    doors = {**ways, **crowd.openness}
     if world.pictures.quality is None:
-        return world.with_doors({d: round(x, 1) for d, x in doors.items()})
-    world = world.with_doors(ways)
-    if len(crowd.clocks) or world.moment.people:
-        world.show(dataclasses.replace(world.moment, openness=doors, people=crowd.figures), slack=3 * SLACK)
+        return world.with_doors({**ways, **{d: round(x, 1) for d, x in crowd.openness.items()}})
+    world, now = world.with_doors(ways), crowd.moment
+    if now.people or world.moment.people:
+        now = dataclasses.replace(world.moment, openness={**ways, **now.openness}, people=now.people)
+        world.show(now, slack=3 * SLACK)
     return world
 
 

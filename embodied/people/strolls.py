@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.assets.people import people
+from embodied.house.house import House
 from embodied.house.household import residents
-from embodied.house.moment import MovingPerson, Triple
+from embodied.house.moment import Moment, MovingPerson, Triple
 from embodied.people.errands import WAY_STEP, Climb, ErrandLeg, Swing, Walks, legs_along, on_stair, openness
 from embodied.people.gait import Limbs, solved
 
@@ -99,23 +100,32 @@ class Crowd:
         return float(np.linalg.norm(to - share[:, None] * way, axis=1).min(initial=math.inf))
 
     @property
-    def figures(self) -> dict[str, MovingPerson]:
-        """Everybody as they are now, by person: `Moment.people`."""
-        return {w.person: w.figure(t) for w, t in zip(self._walkers, self.clocks)}
-
-    @property
     def openness(self) -> dict[str, float]:
-        """How far doors are open that are closed at rest: `Moment.openness`."""
+        """How far people have opened doors that are closed at rest."""
         return {i: x for w, t in zip(self._walkers, self.clocks) for i, x in w.openness(t).items()}
 
+    @property
+    def moment(self) -> Moment:
+        """Everybody as they are now, by person, and the doors that they open."""
+        return Moment(
+            openness=self.openness, people={w.person: w.figure(t) for w, t in zip(self._walkers, self.clocks)}
+        )
 
-def draw_strolls(walks: Walks, count: int, start: Sequence[float], *, rng: np.random.Generator) -> tuple[Stroll, ...]:
-    """`count` of those who live in a house, and visitors where these are fewer, who walk between rooms, begin away from
-    (x, y, z) `start` and keep apart, also from each other's doors; fewer where there is no room for that."""
+
+def who_is_about(house: House, count: int, *, rng: np.random.Generator) -> list[str]:
+    """Those of who lives in a house, in any order, and visitors where these are fewer than `count`."""
+    at_home = {p.id for p in residents(house)}
+    return [str(p) for who in (at_home, people().keys() - at_home) for p in rng.permutation(sorted(who))][:count]
+
+
+def draw_strolls(
+    walks: Walks, who: Sequence[str], start: Sequence[float], *, rng: np.random.Generator
+) -> tuple[Stroll, ...]:
+    """People who walk between rooms, begin away from (x, y, z) `start` and keep apart, also from each other's doors;
+    fewer where there is no room for that."""
     times, others, strolls, ground = np.arange(0.0, TOGETHER, 0.5), list[np.ndarray](), list[Stroll](), walks.ground
-    inside, at_home = np.flatnonzero(walks.clear), {p.id for p in residents(walks.house)}
-    known = [*rng.permutation(sorted(at_home)), *rng.permutation(sorted(people().keys() - at_home))]
-    for person in map(str, known[:count]):
+    inside = np.flatnonzero(walks.clear)
+    for person in who:
         for _ in range(TRIES):
             a, b = rng.choice(inside, 2).tolist()
             seconds = np.round([rng.uniform(*PAUSES), rng.uniform(0, TOGETHER)], 2).tolist()

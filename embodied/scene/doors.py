@@ -10,7 +10,7 @@ and reads house_metadata.json.
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -116,6 +116,12 @@ def openness(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, float]:
     for name, x in zip(names, np.clip(data.qpos[adr] / reach, 0, 1).tolist(), strict=True):
         out[name] = max(out.get(name, 0.0), x)
     return out
+
+
+def set_openness(model: mujoco.MjModel, data: mujoco.MjData, ways: Mapping[str, float]) -> None:
+    """Open what turns or slides, by the names of `openness`, as far."""
+    for name, adr, reach in zip(*_ways_open(model)):
+        data.qpos[adr] = ways[name] * reach if name in ways else data.qpos[adr]
 
 
 def metadata(house: House, model: mujoco.MjModel) -> dict[str, Any]:

@@ -42,19 +42,24 @@ def add_person(spec: mujoco.MjSpec, name: str, person: Person) -> None:
     for joint, ((a, b), radius) in capsules(person.id).items():
         body = spec.worldbody.add_body(name=f"{name}/{joint}", mocap=True, pos=[0.0, 0.0, AWAY])
         kind = mujoco.mjtGeom.mjGEOM_CAPSULE
-        body.add_geom(type=kind, size=[radius, 0.0, 0.0], fromto=[*a, *b], group=3)  # that viewers hide
+        how = {"size": [radius, 0.0, 0.0], "fromto": [*a, *b], "group": 3}  # that viewers hide
+        body.add_geom(type=kind, name=f"{name}#{joint}", **how)
 
 
-def stand_people(model: mujoco.MjModel, data: mujoco.MjData, moment: Moment) -> None:
-    """Put the capsules of everybody that `add_person` added where a moment has them, and away who is not there."""
+def stand_people(model: mujoco.MjModel, data: mujoco.MjData, moment: Moment, share: float = 1.0) -> None:
+    """Move the capsules of everybody that `add_person` added a share of the way to where a moment has them, and away
+    who is not there."""
+    turned = {n: transforms(people()[p.person], p.pose).astype(float) for n, p in moment.people.items()}
     for body in np.flatnonzero(model.body_mocapid >= 0):
         name, slash, joint = model.body(body).name.rpartition("/")
         if not slash or joint not in JOINTS:
             continue
         k, figure = model.body_mocapid[body], moment.people.get(name)
-        data.mocap_pos[k] = (0.0, 0.0, AWAY)
-        if figure is not None:
-            turned = transforms(people()[figure.person], figure.pose)[[*JOINTS].index(joint)].astype(float)
-            data.mocap_pos[k] = figure.place.points(turned[None, :, 3])[0]
-            x, y, z, w = Rotation.from_matrix(figure.place.rotation @ turned[:, :3]).as_quat()
-            data.mocap_quat[k] = w, x, y, z
+        if figure is None:
+            data.mocap_pos[k] = (0.0, 0.0, AWAY)
+            continue
+        turn, part = turned[name][[*JOINTS].index(joint)], share if data.mocap_pos[k, 2] > AWAY else 1.0
+        x, y, z, w = Rotation.from_matrix(figure.place.rotation @ turn[:, :3]).as_quat()
+        quat = np.array([w, x, y, z]) * (1.0 if data.mocap_quat[k] @ (w, x, y, z) > 0 else -1.0)
+        data.mocap_pos[k] += part * (figure.place.points(turn[None, :, 3])[0] - data.mocap_pos[k])
+        data.mocap_quat[k] += part * (quat - data.mocap_quat[k])

@@ -20,7 +20,7 @@ from embodied.kinds import task_kind
 from embodied.navigation.free_space import EYE
 from embodied.navigation.graph import NavGraph
 from embodied.people.errands import Walks
-from embodied.people.strolls import Crowd, draw_strolls
+from embodied.people.strolls import Crowd, draw_strolls, who_is_about
 from embodied.seeds import stream
 
 POOL, MOST_PEOPLE, STEPS = 640, 3, 40
@@ -41,7 +41,8 @@ def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.Par
         rng = stream(inputs.seed, "task", name)
         (start, goal), turn = pairs[int(rng.integers(len(pairs)))].tolist(), int(rng.integers(TURNS))
         here, there = graph.positions[[start, goal]] - EYES
-        people = AmongPeople(draw_strolls(walks, int(rng.integers(1, MOST_PEOPLE + 1)), here, rng=rng))
+        who = who_is_about(house, int(rng.integers(1, MOST_PEOPLE + 1)), rng=rng)
+        people = AmongPeople(draw_strolls(walks, who, here, rng=rng))
         far, aside = math.dist(here, there), math.atan2(*(there - here)[1::-1]) - turn * math.tau / TURNS
         words = f"go to the place {far * math.cos(aside):.1f} m ahead and {far * math.sin(aside):.1f} m to the left"
         return Task(name, "social", world.name, Pose(start, turn), people, (goal,), words, 0.0, STEPS)
