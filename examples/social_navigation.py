@@ -38,6 +38,7 @@ from embodied.envs.continuous import (
     CONTACT,
     FOLLOWS,
     PACE,
+    SPIN,
     ContinuousEnv,
     HabitatAction,
     ShortestPathFollower,
@@ -72,6 +73,8 @@ LOOK_AHEAD, MARGIN, TIME = 8, 0.1, 2.5
 """Cells of a way that an agent goes towards; metres kept free besides; seconds without touch that ORCA plans for."""
 WAITS, SEES = 1.5, 5.0
 """Metres from which who waits for people does so, and ORCA counts them in."""
+BESIDE, KEPT = 1.5, 0.75
+"""Metres from who is followed, and from the way on which they come."""
 TURNING, AGAINST = 0.05, 100.0
 """Metres a second that a turn counts when velocities are compared, and of a metre a second against ORCA."""
 
@@ -143,6 +146,64 @@ class Orca:
         if turn:
             return HabitatAction.LEFT if turn > 0 else HabitatAction.RIGHT
         return turned_to_and_fro(env) if stands else HabitatAction.FORWARD
+
+
+class StepsAside:
+    """Follows the first of the people at BESIDE metres, out of the way on which they came and go.
+
+    It foresees that who stands goes back, and that who comes back goes on as before; near the person it compares
+    headings and numbers of steps by how near the person will come, and by where it then stands.
+    """
+
+    def __init__(self, env: ContinuousEnv) -> None:
+        self.env, self._track = env, env.crowd.places[:1, :2]
+        self._clock = float(env.crowd.clocks[0])
+        self._far = Orca(env)
+
+    def action(self) -> int:
+        env, here, person = self.env, self.env.position, self.env.crowd.places[0, :2]
+        clock, far = float(env.crowd.clocks[0]), self._far.action()  # which looks on, too
+        pace = math.dist(person, self._track[-1]) / max(clock - self._clock, 1e-9)
+        way, self._clock = self._foreseen(person, pace), clock
+        if pace > 0.1:
+            self._track = np.vstack([self._track, person])
+        if math.dist(person, here) > BESIDE + 1.0 or not env.ground.is_free(here, person[None])[0]:
+            return far
+        number, stride = 360 // env.body.turn, env.body.forward
+        turns = (np.arange(number) + number // 2) % number - number // 2
+        angles = env.yaw + turns * math.radians(env.body.turn)
+        units, steps = np.stack([np.cos(angles), np.sin(angles)], 1), np.arange(5)
+        ends = here + stride * steps[:, None, None] * units
+        free = env.ground.is_free(here, ends.reshape(-1, 2)).reshape(ends.shape[:2])
+        spun, times = np.abs(turns) * math.radians(env.body.turn) / SPIN, np.arange(0, TIME, 0.1)
+        gone = np.clip((times[:, None, None] - spun) * PACE, 0, stride * steps[:, None])
+        at = here + gone[..., None] * units
+        metres = np.append(0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1)))
+        coming = np.column_stack([np.interp(times * max(pace, PACE), metres, c) for c in way.T])
+        nearest = np.linalg.norm(at - coming[:, None, None], axis=-1).min(0)
+        lines = np.vstack([way, self._track[-80:]])[::2]
+        aside = np.linalg.norm(ends[..., None, :] - lines, axis=-1).min(-1)
+        apart = np.linalg.norm(ends - coming[len(times) // 2], axis=-1)
+        cost = 10 * np.maximum(KEPT - nearest, 0) + np.abs(apart - BESIDE) + 2 * np.maximum(KEPT - aside, 0)
+        cost += np.where(free, 0.1 * spun + 0.05 * steps[:, None], np.inf)
+        count, k = np.unravel_index(int(np.argmin(cost)), cost.shape)
+        turn = turns[int(np.argmax(units @ (person - here)))] if count == 0 else turns[k]
+        if turn:
+            return HabitatAction.LEFT if turn > 0 else HabitatAction.RIGHT
+        return HabitatAction.FORWARD if count else turned_to_and_fro(env)
+
+    def _foreseen(self, person: np.ndarray, pace: float) -> np.ndarray:
+        """(n, 2) points of the way that the person will go: back where they stand, on where they have been before."""
+        track, ahead = self._track, person - self._track[-1]
+        back = np.vstack([person, track[::-1][:60], track[::-1][-1:]])
+        if pace < 0.1:
+            return back
+        before = track[:-20]
+        k = int(np.linalg.norm(before - person, axis=1).argmin()) if len(before) > 2 else 0
+        if len(before) > 2 and math.dist(before[k], person) < 0.3:
+            onward = (before[min(k + 1, len(before) - 1)] - before[max(k - 1, 0)]) @ ahead > 0
+            return np.vstack([person, track[k : k + 60] if onward else before[k::-1][:60]])
+        return person + np.arange(8)[:, None] * 0.4 * ahead / np.linalg.norm(ahead)
 
 
 def half_plane(p: np.ndarray, v: np.ndarray, radius: float, step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -378,6 +439,7 @@ FOLLOWERS = {
     "random": at_random,
     "goes where the person was at first": lambda env: Orca(env.play, knows=False).action,
     "knows where the person is": lambda env: Orca(env.play).action,
+    "knows, and steps aside": lambda env: StepsAside(env.play).action,
 }
 
 

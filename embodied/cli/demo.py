@@ -9,6 +9,7 @@ somebody who lives there walks and sits down, filmed as DIR/walk.mp4.
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 import time
 from collections.abc import Iterator, Sequence
@@ -187,6 +188,7 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route]) -> di
     return recorded(world, episode, Sinks(args.out / "help.rrd", args.connect), **how)
 
 
+@functools.cache
 def somebody_walks(world: World) -> tuple[Day, str, float, float] | None:
     """The day of the household, and who walks in it from and until when, through a door if one is closed, far, and
     sits down; None where nobody does."""

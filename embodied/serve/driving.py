@@ -22,11 +22,14 @@ import cv2
 import numpy as np
 
 from embodied.assets.decoding import jpeg
+from embodied.assets.people import people
 from embodied.envs.continuous import Body, NavMeshCache
 from embodied.errors import UnableError
+from embodied.house.moment import Moment, MovingPerson
 from embodied.interface import Place, Pose
 from embodied.navigation.doors import MARK, place_named
 from embodied.navigation.free_space import EYE
+from embodied.people.gait import STRIDE, Limbs, solved, walk
 from embodied.render.camera import camera_at
 from embodied.render.panorama_file import PanoramaFile, beside
 from embodied.world import World
@@ -43,15 +46,19 @@ SLOWEST = 2.0
 """Seconds for a picture from which on a machine is too slow to drive on."""
 LIVE_KEPT = 64
 """Live pictures in memory."""
-Eye = tuple[str, float, float, float, float]
-"""World, x, y, z of the camera in metres, yaw in radians."""
+BEHIND, DOWN = 2.2, -0.2
+"""Metres of the camera behind who is steered, and radians that it looks up."""
+Eye = tuple[str, float, float, float, float, MovingPerson | None]
+"""World, x, y, z of the camera in metres, yaw in radians, and who is steered."""
 
 
 class BrowserBody:
     """The body of somebody who drives, in one episode. Where it is follows from the order of its actions."""
 
-    def __init__(self, place: Place, pose: Pose, grounds: NavMeshCache) -> None:
-        self._graph, self._ground = place.graph, grounds.of(place.house)
+    def __init__(self, place: Place, pose: Pose, grounds: NavMeshCache, figure: str = "") -> None:
+        """`figure`: somebody of the pack who is steered, and seen from behind; nobody where empty."""
+        self._limbs, self._walked, self._steps = Limbs(people()[figure]) if figure else None, 0.0, False
+        self._who, self._graph, self._ground = figure, place.graph, grounds.of(place.house)
         nodes = np.asarray(place.graph.positions)
         self._nodes = self._ground.plane(nodes - [0.0, 0.0, EYE])
         self._world, self.yaw, self._here = place.name, pose.yaw, pose.node
@@ -61,10 +68,12 @@ class BrowserBody:
     def act(self, action: int) -> int:
         """Do one of ACTIONS; the viewpoint where the body is now: the nearest that it could go straight to."""
         if action == 0:
-            ahead = BODY.forward * np.array([math.cos(self.yaw), math.sin(self.yaw)])
+            before, ahead = self.position, BODY.forward * np.array([math.cos(self.yaw), math.sin(self.yaw)])
             self.position = self._ground.moved(self.position, self.position + ahead, sliding=True)
+            self._walked += math.dist(before, self.position)
         else:
             self.yaw += math.radians(BODY.turn) * (1 if action == 1 else -1)
+        self._steps = action == 0
         away = np.linalg.norm(self._ground.world(self._nodes) - self._ground.world(self.position), axis=1)
         straight = self._ground.is_free(self.position, self._nodes)
         straight[self._here] = True
@@ -74,7 +83,23 @@ class BrowserBody:
     @property
     def eye(self) -> Eye:
         x, y, z = self._ground.world(self.position).tolist()
-        return self._world, x, y, z + BODY.eye, self.yaw
+        if self._limbs is None:
+            return self._world, x, y, z + BODY.eye, self.yaw, None
+        far = [(math.cos(self.yaw + turn), math.sin(self.yaw + turn)) for turn in (math.pi, 2.4, 3.9, 1.6, 4.7)]
+        back = (self._ground.moved(self.position, self.position + BEHIND * np.array(f), sliding=False) for f in far)
+        at = max(back, key=lambda p: round(math.dist(p, self.position)))
+        seen = self._ground.world(at).tolist()
+        return self._world, *seen[:2], seen[2] + EYE, math.atan2(y - seen[1], x - seen[0]), self._figure(self._limbs)
+
+    def _figure(self, limbs: Limbs) -> MovingPerson:
+        """Who is steered: in the middle of a walk, or standing."""
+        here, yaw = self._ground.world(self.position), self.yaw
+        if not self._steps:
+            return MovingPerson(self._who, *solved(limbs, limbs.standing(here, yaw)))
+        since, ahead = 1.0 + self._walked % (STRIDE * limbs.leg), np.array([math.cos(yaw), math.sin(yaw), 0.0])
+        course = walk(limbs, here + np.outer((-since, 2.0), ahead), np.full(2, yaw))
+        times = np.linspace(0.0, course.seconds, 99)
+        return MovingPerson(self._who, *solved(limbs, course.at(np.interp(since, [*map(course.walked, times)], times))))
 
 
 class Live:
@@ -110,8 +135,11 @@ class Live:
         return await asyncio.shield(self._drawn[name])
 
     def _draw(self, eye: Eye) -> bytes:
-        name, x, y, z, yaw = eye
-        rgb = self._world(name).renderer.rgb(camera_at((x, y, z), yaw, 0.0, LIVE_VFOV), LIVE_SIZE)
+        name, x, y, z, yaw, figure = eye
+        if figure is not None:
+            self._world(name).show(Moment(people={figure.person: figure}))
+        camera = camera_at((x, y, z), yaw, DOWN if figure else 0.0, LIVE_VFOV)
+        rgb = self._world(name).renderer.rgb(camera, LIVE_SIZE)
         return jpeg(rgb, LIVE_QUALITY)
 
 

@@ -137,7 +137,8 @@ class Game:
             self.agent, self.assistant = self.table.agent, self.table.assistant
         self.observation: interface.Observation | None = self.env.reset(self.task, seed=self.seed)
         drives = self.table.part.moves == "drive" and "agent" in self.people
-        self.drive = BrowserBody(self.env.world, self.task.start, self.table.grounds) if drives else None
+        where = self.env.world, self.task.start, self.table.grounds
+        self.drive = BrowserBody(*where, self.table.part.figure) if drives else None
         self.last_change = self.begun
         self._steps: list[interface.Step] = []
         self._asked_at = 0.0

@@ -98,7 +98,8 @@ def open_study(
         live = Live(functools.partial(open_world, data))
         for table in driven:
             for task in {t.world: t for t in (table.practice, *table.tasks.values())}.values():
-                live.prepare(BrowserBody(table.places[task.world], task.start, table.grounds).eye)
+                where = table.places[task.world], task.start, table.grounds
+                live.prepare(BrowserBody(*where, table.part.figure).eye)
     sessions = Sessions(study, tables, viewed)
     for event in store.events():
         sessions.apply(event)

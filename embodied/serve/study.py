@@ -8,6 +8,7 @@ from pathlib import Path
 from urllib.parse import quote, urlsplit
 
 from embodied.assets.json_file import read_toml
+from embodied.assets.people import people
 from embodied.records import RecordError, from_plain
 
 PART_KINDS = ("play", "rate", "describe")
@@ -51,6 +52,8 @@ class StudyPart:
     """Who answers: 'person', 'simulated', 'llm', 'none' or 'module:Class'."""
     moves: str = "viewpoints"
     """How a person who acts moves: from one of the 'viewpoints' to the next, or 'drive', with live pictures."""
+    figure: str = ""
+    """Who is steered by a person who drives, and seen from behind, in lit pictures: somebody of docs/people.md."""
     questions: tuple[Question, ...] = ()
     """Questions that a person may choose; with `free_question`, own words besides."""
     free_question: bool = True
@@ -83,6 +86,8 @@ class StudyPart:
             raise ValueError("agent or assistant should be 'person'; nobody would take part")
         if self.moves not in MOVES or (self.moves == "drive" and (self.kind != "play" or self.agent != PERSON)):
             raise ValueError(f"moves should be one of {list(MOVES)}, and only people drive; got {self.moves!r}")
+        if self.figure and (self.figure not in people() or self.moves != "drive"):
+            raise ValueError(f"figure should be one of {sorted(people())} where moves is 'drive', got {self.figure!r}")
         if self.kind != "play" and bool(self.of) == bool(self.episodes):
             raise ValueError("a part that judges needs either `of`, a part of this study, or `episodes`, a file")
         if PERSON in (self.agent,) and self.assistant != "none" and not (self.questions or self.free_question):
