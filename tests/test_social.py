@@ -181,7 +181,7 @@ def test_environments_show_people_and_tell_the_measures(world):
 
 def test_a_person_stops_wheels_and_pushes_them_and_opens_the_door_that_they_cannot():
     shut = Moment(openness={"door_1": 0.0}).applied(furnished(two_rooms()))
-    driver = Driver(shut, HandCatalogue(), [people()["mei"]], ["door_1"])
+    driver = Driver(shut, HandCatalogue(), ["mei"], ["door_1"])
     someone, door = solved(limbs := Limbs(people()["mei"]), limbs.standing(np.array([2.0, 2.0, 0.0]), 0.0)), "door_1"
     stands = Moment(people={"mei": MovingPerson("mei", *someone)})
     driver.place(np.array([3.0, 2.0, 1.5]), math.pi)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
+from embodied.assets.people import people as everybody
 from embodied.geometry import rotation
 from embodied.house.moment import WIDEST, Moment
 from embodied.navigation.free_space import ajar_doors
@@ -22,7 +23,6 @@ from embodied.scene.people import add_person, stand_people
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
-    from embodied.assets.people import Person
     from embodied.house.house import House
 
 WHEELS = Path(__file__).parent / "wheels.xml"
@@ -55,16 +55,12 @@ class Driver:
     """Owns the physics of one house with the body in it."""
 
     def __init__(
-        self, house: House, catalogue: Catalogue, people: Sequence[Person] = (), doors: Collection[str] = ()
+        self, house: House, catalogue: Catalogue, people: Sequence[str] = (), doors: Collection[str] = ()
     ) -> None:
-        """
-        Args:
-          people: who may walk about; their bodies are named as they are.
-          doors: that people open; the body cannot.
-        """
+        """`people`, of assets.people, may walk about and open `doors`, which the body cannot."""
         spec, self._doors = build_spec(house, catalogue, parts=()), dict.fromkeys(doors, 0.0)
-        for person in people:
-            add_person(spec, person.id, person)
+        for name in people:
+            add_person(spec, name, everybody()[name])
         for name, hinged in _leaves_on_hinges(house, catalogue, ajar_doors(house) | {*doors}).items():
             for g in [g for g in spec.geoms if owner_of_name(g.name) == name]:
                 _hang(spec, g, *hinged)

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium import spaces
 
-from embodied.assets.people import people
 from embodied.assistants.descriptions import word_number
 from embodied.envs.continuous import PERSONAL
 from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver
@@ -157,9 +156,8 @@ class Driving:
         if name not in self._stages:
             house = self.world.house
             who = who_is_about(house, self.settings.people, rng=stream(0, "visitors", name))
-            walks, bodies = Walks(house) if who else None, [people()[p] for p in who]
-            doors = [s.door for s in walks.swings] if walks else ()
-            driver = Driver(house, self.world.catalogue, bodies, doors)
+            walks = Walks(house) if who else None
+            driver = Driver(house, self.world.catalogue, who, [s.door for s in walks.swings] if walks else ())
             self._stages[name] = driver, FloorWays(house, stairs=False), walks, who
         self._stages.move_to_end(name)
         if len(self._stages) > KEPT:

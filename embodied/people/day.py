@@ -327,7 +327,8 @@ class _Planner:
         if here.settled:
             add(when + SETTLING[here.settled], here, (here.settled, 0.0))
         limbs, turned = Limbs(self.figures[name]), (here.heading, there.heading)
-        legs, doors = legs_along(limbs, line, self.walks.swings, self.walks.climbs, own[-1].end, turned)
+        swings = self.walks.swings + self.walks.fronts
+        legs, doors = legs_along(limbs, line, swings, self.walks.climbs, own[-1].end, turned)
         for leg in legs[1:]:
             add(leg.end, there, (0.0, 0.0), leg)
         self.doors += doors

@@ -24,15 +24,12 @@ from embodied.navigation.graph import AGENT_RADIUS, stair_ends
 from embodied.people.gait import Bearing, Course, Limbs, smooth, turn, walk
 from embodied.scene.stairs import flights_of
 
-DOOR_SECONDS, TICK = 1.4, 0.1
-"""Seconds in which a door opens, and between the moments at which it is asked whether somebody is past it."""
-HANDLE_REACH, WAY_STEP, BODY_GAP, LEAST_TURN = 0.85, 0.05, 0.45, 0.1
-"""Metres from which a hand goes to the handle of a door, between the points of a way, and between two people's middles
-at least; radians below which nobody turns on the spot."""
-STEP_EDGE = 0.14
-"""Metres of a foot from the edge of a landing."""
+DOOR_SECONDS = 1.4
+HANDLE_REACH, WAY_STEP, BODY_GAP, STEP_EDGE, LEAST_TURN = 0.85, 0.05, 0.45, 0.14, 0.1
+"""Metres from which a hand goes to the handle of a door, between the points of a way, between two people's middles at
+least, and of a foot from the edge of a landing; radians below which nobody turns on the spot."""
 Climb: TypeAlias = tuple[Triple, ...]
-"""Where feet land on a stair, metres, world: on the floor below, on each tread and landing, on the floor above."""
+"""Places of feet on a stair, metres, world: on the floor below, on each tread and landing, on the floor above."""
 Treads: TypeAlias = Sequence[tuple[int, float]]
 """Numbers of points of a way, and heights, metres."""
 
@@ -95,12 +92,13 @@ class Walks:
     """Owns the floor of a house whose doors people open."""
 
     def __init__(self, house: House) -> None:
-        self.house, shut = house, closed_doors(house)
+        shut = closed_doors(house)
         self.ground = FloorWays(opened(house, shut))
-        self.swings = [swing_of(house, o) for o in house.openings if o.id in shut or o.kind == "front_door"]
+        self.swings = [swing_of(house, o) for o in house.openings if o.id in shut]
+        self.fronts = [swing_of(house, o) for o in house.openings if o.kind == "front_door"]
         self.climbs = [climb_of(s) for s in house.stairs]
-        swept = np.any([s.meets(self.ground.xyz) for s in self.swings] or [np.zeros(len(self.ground.xy), bool)], axis=0)
-        self.clear = ~swept & (self.ground.room_of_cell != "")
+        inside = self.ground.room_of_cell != ""
+        self.clear = np.all([inside, *(~s.meets(self.ground.xyz) for s in self.swings + self.fronts)], axis=0)
         """(n,) bool: cells of the ground where somebody may stand, in a room and not in the way of a leaf."""
 
     def line(
@@ -193,21 +191,17 @@ def legs_along(
 
 
 def on_stair(points: np.ndarray, climb: Climb) -> Treads:
-    """Where feet land on a stair that a way leads over; nowhere on others."""
-    landed, apart = list[tuple[int, float]](), np.linalg.norm(points - np.array(climb)[:, None], axis=2)
-    if apart[len(climb) // 2].min() > 1.0:
-        return landed
-    for i, (_, _, z) in sorted(zip(apart.argmin(1).tolist(), climb), key=lambda m: m[0]):
-        if not landed or i > landed[-1][0]:
-            landed.append((i, z))
-    return landed
+    """Places of feet on a stair that a way leads over; none on others."""
+    apart = np.linalg.norm(points - np.array(climb)[:, None], axis=2)
+    landed = dict(sorted(zip(apart.argmin(1).tolist(), (z for *_, z in climb))))
+    return [*landed.items()] if apart[len(climb) // 2].min() < 1.0 else []
 
 
 def _past(swing: Swing, legs: Sequence[ErrandLeg]) -> float:
     """Seconds at which who walks is past a leaf."""
-    times = [(leg, t) for leg in legs for t in np.arange(leg.begin, leg.end, TICK)]
+    times = [(leg, t) for leg in legs for t in np.arange(leg.begin, leg.end, 0.1)]
     met = swing.meets(np.array([leg.place(t)[0] for leg, t in times]).reshape(-1, 3))
-    return max((t for (_, t), m in zip(times, met) if m), default=legs[0].begin) + 2 * TICK
+    return max((t for (_, t), m in zip(times, met) if m), default=legs[0].begin) + 0.2
 
 
 def smooth_line(cells: np.ndarray, space: shapely.Geometry, others: shapely.Geometry | None = None) -> np.ndarray:

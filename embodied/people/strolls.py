@@ -13,7 +13,7 @@ from embodied.assets.people import people
 from embodied.house.house import House
 from embodied.house.household import residents
 from embodied.house.moment import Moment, MovingPerson, Triple
-from embodied.people.errands import WAY_STEP, Climb, ErrandLeg, Swing, Walks, legs_along, on_stair, openness
+from embodied.people.errands import WAY_STEP, Climb, ErrandLeg, Swing, Walks, legs_along, openness
 from embodied.people.gait import Limbs, solved
 
 PERSON_RADIUS, PERSON_HEIGHT, ABOUT, SHORTEST = 0.25, 1.7, 1.5, 3.0
@@ -37,7 +37,7 @@ class Stroll:
     swings: tuple[Swing, ...] = ()
     """Doors on the way, which they open and close."""
     climbs: tuple[Climb, ...] = ()
-    """Stairs on the way."""
+    """Stairs of the house."""
 
 
 class Walker:
@@ -107,9 +107,8 @@ class Crowd:
     @property
     def moment(self) -> Moment:
         """Everybody as they are now, by person, and the doors that they open."""
-        return Moment(
-            openness=self.openness, people={w.person: w.figure(t) for w, t in zip(self._walkers, self.clocks)}
-        )
+        figures = {w.person: w.figure(t) for w, t in zip(self._walkers, self.clocks)}
+        return Moment(openness=self.openness, people=figures)
 
 
 def who_is_about(house: House, count: int, *, rng: np.random.Generator) -> list[str]:
@@ -124,7 +123,7 @@ def draw_strolls(
     """People who walk between rooms, begin away from (x, y, z) `start` and keep apart, also from each other's doors;
     fewer where there is no room for that."""
     times, others, strolls, ground = np.arange(0.0, TOGETHER, 0.5), list[np.ndarray](), list[Stroll](), walks.ground
-    inside = np.flatnonzero(walks.clear)
+    inside = np.flatnonzero(ground.room_of_cell != "")
     for person in who:
         for _ in range(TRIES):
             a, b = rng.choice(inside, 2).tolist()
@@ -135,16 +134,16 @@ def draw_strolls(
             line = walks.line(ground.xy[ways.cells(a)])
             points = np.round([*line[:-1:4], line[-1]], 3)
             swings = tuple(s for s in walks.swings if s.stop(line) is not None)
-            climbs = tuple(c for c in walks.climbs if on_stair(line, c))
-            stroll = Stroll(person, tuple((x, y, z) for x, y, z in points.tolist()), *seconds, swings, climbs)
+            way = tuple((x, y, z) for x, y, z in points.tolist())
+            stroll = Stroll(person, way, *seconds, swings, tuple(walks.climbs))
             walker = Walker(stroll)
             if math.dist(walker.place(0.0)[:3], start) < ABOUT:
                 continue
             track = np.array([walker.place(t)[:3] for t in times])
-            met = any(s.meets(x).any() for x in others for s in swings)
-            if met or any(s.meets(track).any() for x in strolls for s in x.swings):
-                continue
-            if all(np.linalg.norm(track - x, axis=1).min() > 2 * PERSON_RADIUS for x in others):
+            apart = all(np.linalg.norm(track - x, axis=1).min() > 2 * PERSON_RADIUS for x in others)
+            met = [s.meets(line[[0, -1]]).any() for s in walks.swings]
+            met += [s.meets(x).any() for x in others for s in swings]
+            if apart and not any(met + [s.meets(track).any() for x in strolls for s in x.swings]):
                 strolls.append(stroll)
                 others.append(track)
                 break
