@@ -16,6 +16,7 @@ from embodied.navigation.floor_ways import FloorWays
 from embodied.navigation.free_space import free_floor, opened, room_doors
 from embodied.navigation.graph import AGENT_RADIUS
 from embodied.people.day import errand
+from embodied.people.errands import Walks
 
 SOMEBODY = people()["mei"]
 
@@ -75,3 +76,20 @@ def test_who_opens_a_door_reaches_its_handle_where_it_is_near_and_who_sits_down_
     pelvis = last.place.points(joint_positions(SOMEBODY, last.pose)["pelvis"][None])[0]
     np.testing.assert_allclose(pelvis, [*seat[:2], 0.45 + SOMEBODY.seat], atol=1e-6)
     assert math.isclose(there.doors[0][1], going.doors[0][1]) and WIDEST > 1
+
+
+def test_errands_lead_over_stairs_where_feet_stand_on_treads():
+    house = generate_house(0, HouseConfig(area=(90, 120), storeys=2))
+    walks = Walks(house)
+    low, high = (walks.ground.xyz[walks.clear][k].tolist() for k in (0, -1))
+    heights = np.array([z for climb in walks.climbs for *_, z in climb])
+    for begin, end in ((low, high), (high, low)):
+        going = errand(house, SOMEBODY, begin, end)
+        legs = [p.leg for p in going.pieces[SOMEBODY.id] if p.leg]
+        assert going.at(seconds(going)).people[SOMEBODY.id].place.position[2] == pytest.approx(end[2])
+        stair = next(x for x in legs if np.ptp(x.course.plants[:, 1]) > 2)
+        ankle, stood = stair.course.limbs.ankle, set[float]()
+        for t in np.arange(0, stair.course.seconds, 0.1):
+            flat = [f[2] - ankle for f in stair.course.at(t).feet if f[4] == 0]
+            stood |= {float(z) for z in heights for x in flat if abs(x - z) < 1e-3}
+        assert stood == {float(z) for z in heights}
