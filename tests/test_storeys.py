@@ -23,7 +23,7 @@ from embodied.generate.program import draw_storeys_of
 from embodied.generate.stairwell import fitting
 from embodied.house.floor_plan import paint_plan
 from embodied.house.house import House, HouseError
-from embodied.house.shapes import footprint, open_floor, opening_of, room_at, well_of
+from embodied.house.shapes import footprint, open_floor, opening_of, room_at, slope_over, well_of
 from embodied.language.clauses import DOWN, UP, Climb
 from embodied.language.grammar import Phrase, parse, say
 from embodied.language.lexicon import lexicon_of
@@ -33,7 +33,7 @@ from embodied.navigation.connectivity import from_matterport, to_matterport
 from embodied.navigation.floor_ways import FloorWays, FreePoses
 from embodied.navigation.free_space import EYE
 from embodied.navigation.graph import build_graph, stair_ends
-from embodied.scene.model import COLLISION, build_spec
+from embodied.scene.model import COLLISION, VISUAL, build_spec
 from embodied.scene.stairs import flights_of, railings
 from embodied.seeds import stream
 
@@ -104,6 +104,41 @@ def test_a_plan_of_ones_own_has_a_room_in_the_shape_of_an_l(tmp_path):
     file.write_text(json.dumps(plan))
     with pytest.raises(HouseError, match="a rectangle or an L"):
         load_plan(file)
+
+
+ATTIC = HouseConfig(area=(50, 60), special=("attic",))
+
+
+def test_ceilings_under_the_roof_slope_and_nothing_is_in_the_way_of_light_through_their_windows():
+    house, hit = generate_house(7, ATTIC, stages=BARE), np.zeros(1, np.int32)
+    model = build_spec(house, load_catalogue()).compile()
+    mujoco.mj_forward(model, data := mujoco.MjData(model))
+
+    def up(group: int, at: np.ndarray) -> float:
+        only = (np.arange(6) == group).astype(np.uint8)
+        return mujoco.mj_ray(model, data, np.append(at, 1.5), np.array([0, 0, 1.0]), only, 1, -1, hit)
+
+    assert [o.kind for o in house.openings].count("roof_window") > 2
+    for o in (o for o in house.openings if o.kind == "roof_window"):
+        (_, way, knee), beside = slope_over(house.room_by_id[o.rooms[0]], o), 0.1 * np.subtract(o.a, o.b)
+        for deep in (0.6, 0.9):
+            high, at = knee + deep - 1.5, np.mean([o.a, o.b], 0) + deep * way + 0.05 * beside
+            assert up(COLLISION, np.add(o.a, beside) + deep * way) == pytest.approx(high, abs=1e-3)
+            assert up(VISUAL, np.add(o.a, beside) + deep * way) == pytest.approx(high, abs=1e-3)
+            assert up(COLLISION, at) == pytest.approx(high, abs=1e-3) and up(VISUAL, at) > high + 0.05
+
+
+def test_under_the_roof_nothing_sticks_through_the_slope_and_nobody_stoops():
+    house = generate_house(7, ATTIC)
+    assert House.from_json(house.to_json()) == house and any(r.slopes for r in house.rooms)
+    for p in house.placements:
+        room = house.room_by_id[p.room]
+        corners = np.asarray(footprint(p).exterior.coords)
+        assert room.clear_height(house.storeys[0].height, corners).min() > p.position[2] + p.size[2] - 0.01, p.id
+    graph = build_graph(house)
+    for name, eye in zip(graph.room_of_node, graph.positions):
+        assert house.room_by_id[name].clear_height(2.7, eye[:2]) >= 2.0
+    assert {*graph.room_of_node} == {r.id for r in house.rooms}
 
 
 @pytest.mark.parametrize("storeys", [2, 3])

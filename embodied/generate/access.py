@@ -13,7 +13,8 @@ from embodied.generate.modules import Cell
 MOVING = {"hall", "corridor", "stairwell"}
 """Kinds of room that are there to be walked through."""
 
-
+LOW = 12
+"""Depth of what is too low under a slope for doors and windows, decimetres."""
 Pair = tuple[int, int]
 
 
@@ -83,10 +84,25 @@ def beside_floor(floor: Rect, wall: SharedWall) -> SharedWall | None:
     return SharedWall(axis, across, low, high) if across in sides and high > low else None
 
 
+def beside_slopes(cell: Cell, wall: SharedWall) -> SharedWall:
+    """The part of a cell's wall that is high enough for doors and windows; of no length under a slope."""
+    axis, across, low, high = wall
+    for side in cell.slopes:
+        edge = (cell.rect[1:] + cell.rect[:1])[side]
+        if "xy"[side % 2] == axis:
+            high = low if across == edge else high
+        elif side in (1, 2):
+            high = min(high, edge - LOW)
+        else:
+            low = max(low, edge + LOW)
+    return SharedWall(axis, across, low, high)
+
+
 def outer_stretches(
     cells: list[Cell], walls: dict[tuple[int, int], SharedWall], i: int
 ) -> list[tuple[SharedWall, int]]:
-    """Stretches of the edges of cell i that look outdoors, each with the sense of its outward normal, longest first."""
+    """Stretches of the edges of cell i that look outdoors, without what is low under slopes, each with the sense of its
+    outward normal, longest first."""
     x0, y0, x1, y1 = cells[i].rect
     taken = [w for pair, w in walls.items() if i in pair]
     stretches = []
@@ -103,7 +119,8 @@ def outer_stretches(
             at = max(at, q)
         if high > at:
             stretches.append((SharedWall(axis, across, at, high), side))
-    return sorted(stretches, key=lambda f: (-f[0].length, f[0]))
+    high = ((beside_slopes(cells[i], wall), side) for wall, side in stretches)
+    return sorted((f for f in high if f[0].length > 0), key=lambda f: (-f[0].length, f[0]))
 
 
 def has_outer_doors(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> bool:

@@ -7,7 +7,7 @@ from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS, HouseError
 from embodied.house.validation import STYLES
 from embodied.seeds import NOVELTIES
 
-SPECIAL = ("L", "bay", "gallery")
+SPECIAL = ("L", "bay", "gallery", "attic")
 SHAPES = ("rectangle", "L", "T", "U", "cross")
 CHOICES = {
     "weather": WEATHERS,
@@ -70,7 +70,8 @@ class HouseConfig:
     two, and some above 220 m2 three."""
     special: tuple[str, ...] | None = None
     """Rooms that are no boxes, where there is a place for them: L, living and dining room as one; bay, a bay window;
-    gallery, a stairwell that is open to the storey above. None: houses of several storeys may have them."""
+    gallery, a stairwell that is open to the storey above; attic, a highest storey under the roof. None: houses of
+    several storeys may have the first three."""
     open_plan: bool | None = None
     """Connect kitchen, dining and living room by wide openings."""
     style: str | None = None

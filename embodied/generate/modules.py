@@ -35,6 +35,11 @@ class Cell:
     room: int | None = None
     """Cells of one number are one room, of a shape that is no rectangle."""
 
+    attic: bool = False
+    """True for a room that is asked to lie under the roof."""
+    slopes: tuple[int, ...] = ()
+    """Sides over which its ceiling slopes, counted counter-clockwise from the one of the smallest y."""
+
     def is_with(self, other: Cell) -> bool:
         """True if both are of one room."""
         return self.room is not None and self.room == other.room

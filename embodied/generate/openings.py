@@ -14,6 +14,10 @@ from embodied.generate.modules import Cell
 from embodied.house.house import Opening, rounded
 
 Point = tuple[float, float]
+KNEE = 1.1
+"""Height of the walls that slopes begin from, metres."""
+ROOF_WINDOW, ROOF_WINDOWS_APART = (0.78, 0.94, 1.14), 1.5
+"""Widths of roof windows, and metres of wall that each has."""
 NIB = 0.16
 """From a wall's centre-line corner to the jamb: half an inner wall and 0.1 m, metres."""
 FRENCH = {"living_room": 1.0, "sun_room": 1.0, "family_room": 0.8, "dining_room": 0.35, "library": 0.12}
@@ -173,6 +177,8 @@ def _draw_storey(made: _Openings, height: float, open_plan: bool, rng: np.random
     _outer_doors(made, rng)
     for i in range(len(plan.cells)):
         _windows(made, i, height, rng)
+        for side in plan.cells[i].slopes:
+            _roof_windows(made, i, side, height, rng)
 
 
 def _is_wide(plan: FloorPlan, link: Link) -> bool:
@@ -439,3 +445,20 @@ def _windows(made: _Openings, i: int, height: float, rng: np.random.Generator) -
             made.add_outer(w, "window", start, width, sill=sill, head=min(head, height - 0.15))
             left -= width * (head - sill)
             placed += 1
+
+
+def _roof_windows(made: _Openings, i: int, side: int, height: float, rng: np.random.Generator) -> None:
+    """Windows in the slope over one side of a room, evenly along it."""
+    c = made.plan.cells[i]
+    glass, (x0, y0, x1, y1) = ROOM_TABLE[c.kind].glass, _metres(c)
+    if glass is None:
+        return
+    axis, across = ("x" if side % 2 == 0 else "y"), (y0, x1, y1, x0)[side]
+    low, high = (x0, x1) if axis == "x" else (y0, y1)
+    width = min(float(rng.choice(ROOF_WINDOW)), high - low - 2 * NIB)
+    sill, head = KNEE + 0.1, round(min(height - 0.1, KNEE + 1.1), 2)
+    wanted = glass * _area(c) / len(c.slopes) / (width * (head - sill) * math.sqrt(2))
+    count = int(np.clip(round(wanted), 1, max(1, (high - low) // ROOF_WINDOWS_APART)))
+    for n in range(count):
+        start = round(low + (high - low) * (n + 0.5) / count - width / 2, 2)
+        made.add("roof_window", (made.names[i], None), _jambs(c, axis, across, start, start + width), sill, head)

@@ -4,7 +4,8 @@
 
 Polygons are metres, on a grid of 0.1 m, along the middle of the walls. Each is a rectangle along x and y, or an L or
 another polygon with right angles. A house has at least one hall, where one enters. Rooms upstairs have `"storey": 1`;
-a stair is a room of kind 'stairwell' on each of the storeys that it joins, with the same polygon.
+a stair is a room of kind 'stairwell' on each of the storeys that it joins, with the same polygon. Rooms of the highest
+storey with `"attic": true` lie under the roof.
 """
 
 import dataclasses
@@ -26,6 +27,7 @@ from embodied.generate.footprint import Rect, shared_area
 from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.layout import FloorPlan
 from embodied.generate.modules import Cell
+from embodied.generate.special import under_roof
 from embodied.generate.stages import DEFAULT, STAGES, generate_house, with_plan
 from embodied.generate.stairwell import stairwells
 from embodied.house.house import House, HouseError
@@ -54,6 +56,8 @@ class PlannedRoom:
     polygon: Corners
     """Metres, along the middle of the walls; the first corner may be repeated at the end."""
     storey: int = 0
+    attic: bool = False
+    """The ceiling slopes over outer walls along the ridge; on the highest storey."""
 
 
 @dataclass(frozen=True)
@@ -84,10 +88,23 @@ def load_plan(path: Path) -> FloorPlan:
         number, kind = unknown[0]
         raise HouseError(f"room {number} has the kind {kind!r}; use one of {', '.join(ROOM_TABLE)}")
     _check_size(rooms)
+    parts = [_cells(number, room) for number, room in enumerate(rooms)]
+    for (i, a), (j, b) in itertools.combinations(enumerate(rooms), 2):
+        if a.storey == b.storey and any(shared_area(p.rect, q.rect) for p in parts[i] for q in parts[j]):
+            raise HouseError(f"rooms {i} ({a.kind}) and {j} ({b.kind}) overlap; let them share an edge instead")
     storeys: list[list[Cell]] = [[] for _ in range(max(r.storey for r in rooms) + 1)]
-    for number, room in enumerate(rooms):
-        storeys[room.storey] += _cells(number, room)
-    return plan_of(storeys[0]) if len(storeys) == 1 else _plan_of_storeys(storeys)
+    for room, cells in zip(rooms, parts, strict=True):
+        storeys[room.storey] += cells
+    plan = under_roof(plan_of(storeys[0]) if len(storeys) == 1 else _plan_of_storeys(storeys))
+    low = [c for p in plan.storeys for c in p.cells if c.slopes]
+    if len(low) < sum(r.attic for r in rooms):
+        kinds = [r.kind for r in rooms if r.attic]
+        raise HouseError(
+            f"of the attic rooms {', '.join(kinds)} {len(low)} can have a slope: each needs a whole outer wall along "
+            "the longer side of the highest storey, a depth of 2.3 m (bathrooms 3 m), and 1 m of wall for its door at "
+            "full height; halls, kitchens, stairwells and garages have none"
+        )
+    return plan
 
 
 def _plan_of_storeys(storeys: Sequence[list[Cell]]) -> FloorPlan:
@@ -145,11 +162,8 @@ def plan_of(cells: list[Cell], *, upstairs: bool = False) -> FloorPlan:
     """The cells of a storey with the ways between them.
 
     Raises:
-      HouseError: no hall, no room for the front door, cells that overlap or cannot be reached.
+      HouseError: no hall, no room for the front door, cells that cannot be reached.
     """
-    for (i, a), (j, b) in itertools.combinations(enumerate(cells), 2):
-        if shared_area(a.rect, b.rect):
-            raise HouseError(f"rooms {i} ({a.kind}) and {j} ({b.kind}) overlap; let them share an edge instead")
     if not upstairs and not any(c.kind == "hall" for c in cells):
         raise HouseError("a plan needs a room of kind 'hall', where the front door is")
     walls = walls_between(cells)
@@ -190,7 +204,7 @@ def _cells(number: int, room: PlannedRoom) -> list[Cell]:
             "shapes into rectangles"
         )
     part = number if len(rects) > 1 else None
-    return [Cell(room.kind, r, (r[2] - r[0]) * (r[3] - r[1]) / GRID**2, room=part) for r in rects]
+    return [Cell(room.kind, r, (r[2] - r[0]) * (r[3] - r[1]) / GRID**2, room=part, attic=room.attic) for r in rects]
 
 
 def _rectangles(polygon: Corners) -> list[Rect]:

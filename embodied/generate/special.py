@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from embodied.generate.access import SharedWall, connect, outer_stretches, walls_between
+from embodied.generate.access import MOVING, WET, SharedWall, beside_slopes, connect, outer_stretches, walls_between
 from embodied.generate.footprint import Rect, shared_area
+from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.layout import FloorPlan
 from embodied.generate.modules import Cell
 
@@ -16,6 +17,10 @@ OPEN_BORDER, L_SIDE = 24, 10
 """Shortest border along which two rooms become one, and shortest side of the L that they make, decimetres."""
 BAY_DEPTH, BAY_WIDTHS, BAY_ALONE = 12, (20, 28), 12
 """Depth of a bay, its smallest and largest width, and free ground around it, decimetres."""
+NOT_IN_ATTIC = ("hall", "stairwell", "garage", "kitchen")
+"""Kinds of room that do not lie under the roof."""
+SLOPE, FLAT, FLAT_WET = 16, 7, 14
+"""Depth of the highest slope, and least depths of what is flat beside slopes, also in bathrooms, decimetres."""
 BAY_KINDS = ("living_room", "dining_room", "family_room", "library")
 
 
@@ -27,7 +32,33 @@ def with_special_rooms(plan: FloorPlan, words: tuple[str, ...] | None, *, rng: n
         linked = connect(cells, walls_between(cells))
         if linked is not None:
             plan = replace(plan, cells=tuple(cells), links=tuple(linked[0]))
-    return plan
+    return under_roof(plan, all_rooms=True) if words and "attic" in words else plan
+
+
+def under_roof(plan: FloorPlan, all_rooms: bool = False) -> FloorPlan:
+    """The plan with slopes in those rooms of its highest storey that are to have some, or in all that can: over outer
+    walls along the ridge, which runs along the storey, where doors keep their height."""
+    if plan.above:
+        return replace(plan, above=(*plan.above[:-1], under_roof(plan.above[-1], all_rooms)))
+    cells, walls = list(plan.cells), walls_between(list(plan.cells))
+    x0, y0, x1, y1 = shapely.union_all([shapely.box(*c.rect) for c in cells]).bounds
+    first = int(y1 - y0 > x1 - x0)
+    for i, c in enumerate(plan.cells):
+        if (all_rooms or c.attic) and c.room is None and c.kind not in NOT_IN_ATTIC:
+            edges = c.rect[1:] + c.rect[:1]
+            deep, wide = (abs(edges[k] - edges[k + 2]) for k in (first, 1 - first))
+            whole = {
+                w.across for w, _ in outer_stretches(cells, walls, i) if w.axis == "xy"[first] and w.length == wide
+            }
+            sides = [k for k in (first, first + 2) if edges[k] in whole]
+            most = max(0, (deep - (FLAT_WET if c.kind in WET else FLAT)) // SLOPE)
+            cells[i] = replace(c, slopes=tuple(sides[:most]))
+    upright = lambda k: replace(k, wall=beside_slopes(cells[k.child], beside_slopes(cells[k.parent], k.wall)))
+    for k in plan.links:
+        kinds = {cells[n].kind for n in (k.child, k.parent)}
+        if upright(k).wall.length < (9 if kinds <= MOVING else ROOM_TABLE[cells[k.child].kind].wall):
+            cells = [replace(c, slopes=()) if i in (k.child, k.parent) else c for i, c in enumerate(cells)]
+    return replace(plan, cells=tuple(cells), links=tuple(map(upright, plan.links)))
 
 
 def _joined(cells: list[Cell], rng: np.random.Generator) -> list[Cell]:

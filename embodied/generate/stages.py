@@ -24,7 +24,7 @@ from embodied.generate.kinds import BEDROOMS
 from embodied.generate.layout import FloorPlan, draw_plan, turned, with_short_corridors
 from embodied.generate.modules import Cell
 from embodied.generate.novelty import furnishable
-from embodied.generate.openings import Leaves, draw_openings
+from embodied.generate.openings import KNEE, Leaves, draw_openings
 from embodied.generate.program import WantedRoom, draw_area, draw_program, draw_storeys_of
 from embodied.generate.special import with_special_rooms
 from embodied.generate.stairwell import SLAB, TALLEST, stair_of
@@ -156,7 +156,7 @@ def _bare_house(draft: Draft, palette: Palette, rng: np.random.Generator) -> Hou
     plans = _made(draft.plan, "rooms").storeys
     names = _names(plans)
     height = round(float(rng.choice([2.45, 2.5, 2.6, 2.7, 2.9, 3.0], p=[0.15, 0.25, 0.3, 0.17, 0.08, 0.05])), 2)
-    if len(plans) > 1:
+    if len(plans) > 1 or any(c.slopes for c in plans[-1].cells):
         height = min(height, TALLEST)
     open_plan = draft.config.open_plan
     if open_plan is None:
@@ -219,6 +219,7 @@ def _bare_room(cells: Sequence[Cell], name: str, palette: Palette, storey: int) 
         ceiling_finish=palette.ceiling,
         skirting_finish=palette.skirting,
         storey=storey,
+        slopes=tuple((side, KNEE) for side in cells[0].slopes),
     )
 
 

@@ -11,14 +11,14 @@ from embodied.generate.config import RETRIES, DeadEndError
 from embodied.house.house import House
 from embodied.house.shapes import footprint
 from embodied.navigation.free_space import HEAD, LOW
-from embodied.navigation.graph import AGENT_RADIUS, CELL, closed_rooms, reachable
+from embodied.navigation.graph import AGENT_RADIUS, CELL, blocked_ends, closed_rooms, reachable
 
 NEEDED = ("bed", "toilet", "bath", "shower", "sink", "basin", "cooker", "fridge", "sofa", "wardrobe", "table", "desk")
 """Words of object classes that are moved out of the way last."""
 
 
 def remove_blocking_objects(house: House) -> House:
-    """`house` without the things that keep a body of the agent's radius out of some room.
+    """`house` without the things that keep a body of the agent's radius out of some room or from some stair.
 
     Raises:
       DeadEndError: a room stays closed although nothing stands in the way.
@@ -28,9 +28,12 @@ def remove_blocking_objects(house: House) -> House:
             grid, room_of_cell, reach = reachable(house, storey)
             rooms = [r for r in house.rooms if r.storey == storey]
             closed = closed_rooms(room_of_cell, reach, len(rooms))
-            if not closed:
+            ends = blocked_ends(house, storey, grid.xy[reach])
+            if not closed and not ends:
                 break
-            blocking = _blocking(house, storey, closed, grid.xy[reach])
+            blocking = _blocking(house, storey, closed, ends, grid.xy[reach])
+            if not blocking and not closed:
+                raise DeadEndError(f"a stair of storey {storey} cannot be entered although no object is in the way")
             if not blocking:
                 raise DeadEndError(
                     f"room {rooms[closed[0]].id!r} cannot be entered on foot although no object is in the "
@@ -39,7 +42,7 @@ def remove_blocking_objects(house: House) -> House:
             house = without(house, blocking)
         else:
             names = [rooms[k].id for k in closed]
-            raise DeadEndError(f"rooms {names} stay closed after {RETRIES.clearing} rounds of clearing")
+            raise DeadEndError(f"rooms {names} or stairs stay closed after {RETRIES.clearing} rounds of clearing")
     return house
 
 
@@ -55,8 +58,10 @@ def without(house: House, names: tuple[str, ...]) -> House:
     )
 
 
-def _blocking(house: House, storey: int, closed: list[int], open_cells: np.ndarray) -> tuple[str, ...]:
-    """The placements that the cheapest ways from the open part into the closed rooms run through.
+def _blocking(
+    house: House, storey: int, closed: list[int], ends: list[np.ndarray], open_cells: np.ndarray
+) -> tuple[str, ...]:
+    """The placements that the cheapest ways from the open part into the closed rooms and to `ends` run through.
 
     Args:
       closed: indices of rooms among those of the storey.
@@ -89,12 +94,14 @@ def _blocking(house: House, storey: int, closed: list[int], open_cells: np.ndarr
     at_start[start] = True
     cost, before, _ = dijkstra(dear, directed=False, indices=start, min_only=True, return_predecessors=True)
     way: set[int] = set()
+    goals = [int(np.argmin(np.linalg.norm(grid.xy - end[:2], axis=1))) for end in ends]
     for k in closed:
         goal = np.flatnonzero((room_of_cell == k) & ~at_start)
         # the free part of the room, not merely its doorstep
         free = goal[toll[goal] == 0]
         goal = free if len(free) else goal
-        at = int(goal[np.argmin(cost[goal])]) if len(goal) else -1
+        goals += [int(goal[np.argmin(cost[goal])])] if len(goal) else []
+    for at in goals:
         while at >= 0:
             way.add(at)
             at = int(before[at])

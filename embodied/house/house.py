@@ -29,12 +29,13 @@ from embodied.assets.records import ROOM_KINDS
 SCHEMA = 1
 """Version of house.json; a file of another version is refused."""
 
-OPENING_KINDS = ("door", "passage", "front_door", "back_door", "window", "french_window", "garage_door")
+OPENING_KINDS = ("door", "passage", "front_door", "back_door", "window", "french_window", "garage_door", "roof_window")
 WEATHERS = ("clear", "hazy", "overcast")
 LANDSCAPES = ("suburb", "village", "street", "roofs", "lake", "fields", "forest")
 SEASONS = ("spring", "summer", "autumn", "winter")
 HINGED = ("door", "front_door", "back_door")
 WINDOWS = ("window", "french_window")
+GLAZED = (*WINDOWS, "roof_window")
 DOORS = ("door", "passage", "front_door", "back_door", "french_window", "garage_door")
 """Opening kinds that a person can walk through."""
 
@@ -90,6 +91,22 @@ class Room:
     """Index of the polygon edge (corner i to i+1) that has `accent_finish`."""
     accent_finish: str | None = None
     storey: int = 0
+    slopes: tuple[tuple[int, float], ...] = ()
+    """Edges of the polygon from which the ceiling rises inwards by 45 degrees up to the storey's height, and its height
+    over each, metres."""
+
+    @property
+    def slope_lines(self) -> list[tuple[np.ndarray, np.ndarray, float]]:
+        """A point on the edge under each slope, (2,) metres, the unit way inwards, and the height over it."""
+        ring = np.asarray(self.polygon, float)
+        ways = np.roll(ring, -1, axis=0) - ring
+        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+        return [(ring[k], np.array([-ways[k, 1], ways[k, 0]]), knee) for k, knee in self.slopes]
+
+    def clear_height(self, most: float, points: np.ndarray) -> np.ndarray:
+        """(...,) height of the ceiling over points (..., 2), up to its storey's, metres; slopes run on beyond walls."""
+        rising = (knee + (points - at) @ way for at, way, knee in self.slope_lines)
+        return functools.reduce(np.minimum, rising, np.full(np.shape(points)[:-1], most))
 
 
 @dataclass(frozen=True)
@@ -104,7 +121,7 @@ class Opening:
     """The two jambs on the wall's centre line, metres."""
     sill: float
     head: float
-    """Bottom and top of the hole above the storey's floor, metres."""
+    """Bottom and top of the hole above the storey's floor, metres; a roof window's are in the slope over its wall."""
     leaf_finish: str | None = None
     """Material key of leaf and frame; None for a bare passage."""
     hinge: str = "a"
@@ -247,10 +264,12 @@ class House:
         return float(sum(shapely.Polygon(r.polygon).area for r in self.rooms))
 
     def to_json(self) -> str:
-        """Canonical JSON: sorted keys, no blanks; without landscape and season if left to the seed, and empty voids."""
+        """Canonical JSON: sorted keys, no blanks; without landscape and season if left to the seed, empty voids and
+        slopes."""
         body = {"schema": SCHEMA, **dataclasses.asdict(self)}
         body["sky"] = {k: v for k, v in body["sky"].items() if v is not None}
         body["stairs"] = [{k: v for k, v in s.items() if k != "void" or v} for s in body["stairs"]]
+        body["rooms"] = [{k: v for k, v in r.items() if k != "slopes" or v} for r in body["rooms"]]
         return json.dumps(body, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
     @staticmethod
@@ -321,6 +340,7 @@ def _complaints(house: House) -> Iterator[str]:
         if not polygon.is_valid or polygon.area < 0.5 or not shapely.is_ccw(polygon.exterior):
             yield f"room {room.id!r} needs a simple counter-clockwise polygon of at least 0.5 m2, got {room.polygon}"
         polygons[room.id] = polygon
+    yield from _check_slopes(house)
     yield from _check_overlaps(house, polygons)
     yield from _check_openings(house, polygons)
     yield from _check_walls(house, polygons)
@@ -365,6 +385,21 @@ def _check_storeys(house: House) -> Iterator[str]:
             )
     if empty := sorted(set(range(len(house.storeys))) - {r.storey for r in house.rooms}):
         yield f"the storeys {empty} have no room; put a room on each (Room.storey) or drop them"
+
+
+def _check_slopes(house: House) -> Iterator[str]:
+    for room in (r for r in house.rooms if r.slopes):
+        edges, high = sorted(k for k, _ in room.slopes), house.storey_of(room).height
+        below, pairs = room.storey + 1 < len(house.storeys), ([0], [1], [2], [3], [0, 2], [1, 3])
+        if below or len(room.polygon) != 4 or edges not in pairs:
+            yield (
+                f"room {room.id!r} has slopes over its edges {edges}; it should be a rectangle on the highest storey, "
+                "with one or two opposite ones"
+            )
+        at, way, _ = room.slope_lines[0]
+        deep = np.max((np.array(room.polygon) - at) @ way)
+        if not all(0 < k < high for _, k in room.slopes) or sum(high - k for _, k in room.slopes) > deep:
+            yield f"slopes of room {room.id!r} should begin below {high} m and not meet, got {room.slopes}"
 
 
 def _check_numbers(house: House) -> Iterator[str]:
@@ -478,8 +513,12 @@ def _check_walls(house: House, polygons: dict[str, shapely.Polygon]) -> Iterator
         first = house.room_by_id[o.rooms[0]]
         if line.length < 0.2:
             yield f"opening {o.id!r} is {line.length:.2f} m wide; at least 0.2 m is needed"
-        if o.head > house.storey_of(first).height + 1e-6:
-            yield f"opening {o.id!r} reaches {o.head} m, its storey is {house.storey_of(first).height} m high"
+        high, rooms = house.storey_of(first).height, (house.room_by_id[r] for r in o.rooms if r is not None)
+        over = min(r.clear_height(high, np.array([o.a, o.b])).min() for r in rooms)
+        if o.kind == "roof_window" and not over < o.sill < o.head < high:
+            yield f"roof window {o.id!r} should lie within a slope over its wall, got heights {o.sill} to {o.head}"
+        if o.kind != "roof_window" and o.head > over + 1e-6:
+            yield f"opening {o.id!r} reaches {o.head} m, its storey is {over:.2f} m high there"
         if o.hinge not in ("a", "b") or not 0 <= o.angle <= math.pi:
             yield f"opening {o.id!r} needs a hinge 'a' or 'b' and an angle in [0, pi], got {o.hinge!r}, {o.angle}"
         if o.rooms[1] is not None:

@@ -52,10 +52,35 @@ def opening_of(stair: Stair) -> shapely.Polygon:
     return well_of(stair).union(shapely.Polygon(stair.void)) if stair.void else well_of(stair)
 
 
+HEADROOM = 2.0
+"""Least height of the ceiling over a floor that one walks on, metres."""
+
+
+def under_slopes(room: Room, height: float) -> list[shapely.Polygon]:
+    """For each slope of a room the side of the plane on which its ceiling is lower than `height`."""
+    far = [(at + (height - knee) * way, 1e3 * np.array([way[1], -way[0]])) for at, way, knee in room.slope_lines]
+    return [shapely.LineString([at - along, at + along]).buffer(-1e3, single_sided=True) for at, along in far]
+
+
+def slope_over(room: Room, opening: Opening) -> tuple[np.ndarray, np.ndarray, float]:
+    """The slope of a room that a roof window lies in, as of Room.slope_lines."""
+    jambs = np.array([opening.a, opening.b], float)
+    return next(line for line in room.slope_lines if np.abs((jambs - line[0]) @ line[1]).max() < 0.01)
+
+
+def roof_hole(room: Room, opening: Opening) -> shapely.Polygon:
+    """The plan of a roof window's hole in the ceiling, metres, world."""
+    _, way, knee = slope_over(room, opening)
+    a, b = np.asarray(opening.a, float), np.asarray(opening.b, float)
+    low, high = ((z - knee) * way for z in (opening.sill, opening.head))
+    return shapely.Polygon([a + low, b + low, b + high, a + high])
+
+
 def open_floor(house: House, room: Room) -> shapely.Geometry:
-    """The floor between the walls of a room, without what stairs cover and where they leave it open, metres, world."""
+    """The floor between the walls of a room, without what stairs cover, where they leave it open, and where one would
+    stoop, metres, world."""
     shape = lambda s: opening_of(s) if room.id == s.rooms[1] else well_of(s)
-    wells = [shape(s) for s in house.stairs if room.id in s.rooms]
+    wells = [shape(s) for s in house.stairs if room.id in s.rooms] + under_slopes(room, HEADROOM)
     return house.floor(room).difference(shapely.union_all(wells)) if wells else house.floor(room)
 
 

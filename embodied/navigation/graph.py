@@ -34,6 +34,8 @@ OPENING = 1.0
 """Metres of way that opening or closing a door counts as: it takes about as long as to walk them."""
 BEFORE_STAIRS, LONG_FLIGHT = 0.45, 3.2
 """Distance of viewpoints from a stair's ends, and length of flights that have one on the way, metres."""
+STAIR_GAP = 0.15
+"""How far the cell where one stands before a stair may lie from its end, metres."""
 LONGEST_EDGE = 2.0
 """Longest edge in units of the wanted spacing: 4.5 m; 95 % of Matterport3D's edges are shorter than 5 m."""
 
@@ -210,6 +212,12 @@ def stair_ends(stair: Stair) -> tuple[np.ndarray, np.ndarray]:
     return foot, head
 
 
+def blocked_ends(house: House, storey: int, free: np.ndarray) -> list[np.ndarray]:
+    """The ends of stairs on a storey that are not among the points (n, 2) that can be reached there."""
+    ends = [e for s in house.stairs for r, e in zip(s.rooms, stair_ends(s)) if house.room_by_id[r].storey == storey]
+    return [e for e in ends if np.linalg.norm(free - e[:2], axis=1).min(initial=np.inf) > STAIR_GAP]
+
+
 def stair_points(stair: Stair) -> np.ndarray:
     """(k, 3) where one stands on a stair, from its foot up: in its bends, and on flights that are long; world."""
     path, points = np.asarray(stair.path, float), []
@@ -264,7 +272,7 @@ def _stair_cells(house: House, rooms: Sequence[Room], grid: FreeCells, reach: np
         for room, end in zip(stair.rooms, stair_ends(stair)):
             if room in ids:
                 gap, cell = cKDTree(grid.xy[cells]).query(end[:2])
-                if gap > 0.15:
+                if gap > STAIR_GAP:
                     raise HouseError(f"stair {stair.id!r} cannot be entered from {room!r}; clear the floor before it")
                 ends.append(int(cells[cell]))
     return ends

@@ -67,12 +67,13 @@ class Portals:
 
     of_room: Mapping[str, tuple[Passage, ...]]
     stairs: Mapping[str, tuple[str, ...]]
-    """Rooms joined to a room by a staircase: seen together with it."""
+    """Rooms joined to a room by a staircase, and the outdoors over its roof windows: seen together with it."""
 
 
 def portals_of(house: House) -> Portals:
     """All openings of `house`, each once per side."""
     of_room: dict[str, list[Passage]] = {name: [] for name in (*(r.id for r in house.rooms), OUTDOORS)}
+    beside: dict[str, list[str]] = {r.id: [] for r in house.rooms}
     for o in house.openings:
         (ax, ay), (bx, by) = o.a, o.b
         a, b, width = (float(ax), float(ay)), (float(bx), float(by)), math.hypot(bx - ax, by - ay)
@@ -80,13 +81,14 @@ def portals_of(house: House) -> Portals:
         first, second = o.rooms[0], o.rooms[1] or OUTDOORS
         floor = house.storey_of(house.room_by_id[first]).elevation
         tall = floor + o.sill - FRAME, floor + o.head + FRAME
+        if o.kind == "roof_window":
+            beside[first].append(OUTDOORS)
         of_room[first].append(Passage(o.id, first, second, a, b, (-x, -y), width, *tall))
         of_room[second].append(Passage(o.id, second, first, a, b, (x, y), width, *tall))
-    stairs: dict[str, list[str]] = {r.id: [] for r in house.rooms}
     for s in house.stairs:
-        stairs[s.rooms[0]].append(s.rooms[1])
-        stairs[s.rooms[1]].append(s.rooms[0])
-    return Portals({k: tuple(v) for k, v in of_room.items()}, {k: tuple(v) for k, v in stairs.items()})
+        beside[s.rooms[0]].append(s.rooms[1])
+        beside[s.rooms[1]].append(s.rooms[0])
+    return Portals({k: tuple(v) for k, v in of_room.items()}, {k: tuple(v) for k, v in beside.items()})
 
 
 def visible_rooms(

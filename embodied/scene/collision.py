@@ -61,12 +61,14 @@ DENSITY = 300.0
 
 @dataclass(frozen=True)
 class CollisionBox:
-    """An upright box; turned about z by `yaw` radians."""
+    """A box turned about z by `yaw` radians; upright but for the slopes of roofs."""
 
     centre: tuple[float, float, float]
     half: tuple[float, float, float]
     """Half extents, metres."""
     yaw: float = 0.0
+    tilt: float = 0.0
+    """Turn about its own x axis before that, radians."""
 
 
 def kept_boxes(

@@ -46,7 +46,7 @@ def owners(house: House) -> tuple[str, ...]:
 
 def instance_classes(house: House) -> tuple[str, ...]:
     """The class of each instance id: 'nothing' (0), the furniture's classes, then 'floor', 'wall', 'door', ..."""
-    kinds = {opening.id: opening.kind for opening in house.openings}
+    kinds = {o.id: "window" if o.kind == "roof_window" else o.kind for o in house.openings}
 
     def of_shell(owner: str) -> str:
         whole, _, piece = owner.rpartition("/")

@@ -4,6 +4,7 @@ An opening is built in its own frame: x from jamb p to jamb q along the wall's c
 the first room, z up from the storey's floor; `_Hole.world` carries it into the house.
 """
 
+import dataclasses
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -13,11 +14,11 @@ import numpy as np
 
 from embodied.assets.built.primitives import Shape, between, box, cylinder, frame, joined, part, quads, tube, upright
 from embodied.assets.records import Finish
-from embodied.house.house import WINDOWS, House, Opening
-from embodied.house.shapes import inward
+from embodied.house.house import GLAZED, House, Opening
+from embodied.house.shapes import inward, slope_over
 from embodied.scene.outdoors import facade_finish
 from embodied.scene.part import Part
-from embodied.scene.walls import floor_turn, turned_uv
+from embodied.scene.walls import ROOF, floor_turn, turned_uv
 from embodied.seeds import stream
 
 PIECES = ("reveal", "frame", "leaf", "leaf_2", "handle", "glass", "sill", "threshold")
@@ -51,8 +52,11 @@ class _Hole:
     outside: float
     """y of the far face: the second room's wall or the facade."""
     hinge_at_origin: bool
+    tilt: float = 0.0
+    """Turn about x of a roof window, whose z runs up the slope and whose inside is that of the ceiling."""
 
     def world(self, shape: Shape) -> Shape:
+        shape = shape.turned(self.tilt, "x") if self.tilt else shape
         return shape.turned(self.yaw).moved(*self.origin)
 
     def point(self, x: float, y: float, z: float) -> tuple[float, float, float]:
@@ -78,14 +82,20 @@ def hole_frame(house: House, opening: Opening) -> _Hole:
     far = -half if opening.rooms[1] is not None else -(house.outer_wall - half)
     z = house.storey_of(room).elevation
     at, yaw, at_origin = (float(p[0]), float(p[1]), z), math.atan2(d[1], d[0]), (opening.hinge == "a") != flipped
-    return _Hole(opening, float(np.linalg.norm(q - p)), at, yaw, half, far, at_origin)
+    length = float(np.linalg.norm(q - p))
+    if opening.kind == "roof_window":
+        _, way, knee = slope_over(room, opening)
+        x, y = p + (opening.sill - knee) * way
+        flat = dataclasses.replace(opening, sill=0.0, head=(opening.head - opening.sill) * math.sqrt(2))
+        return _Hole(flat, length, (x, y, z + opening.sill), yaw, 0.0, -ROOF / math.sqrt(2), at_origin, -math.pi / 4)
+    return _Hole(opening, length, at, yaw, half, far, at_origin)
 
 
 def opening_parts(house: House, opening: Opening, finish: Callable[[str], Finish], apart: bool = False) -> list[Part]:
     """Everything that belongs to one opening; `apart`: with the casements of a window apart, though it is closed."""
     hole = hole_frame(house, opening)
-    if opening.kind in WINDOWS:
-        return _window(house, hole, finish, apart or opening.angle > 0)
+    if opening.kind in GLAZED:
+        return _window(house, hole, finish, opening.opens and (apart or opening.angle > 0))
     if opening.kind == "passage" and opening.leaf_finish is None:
         wall = finish(house.room_by_id[opening.rooms[0]].wall_finish)
         reveal = _part(hole, "reveal", "wall", wall, _tunnel(hole, hole.outside, hole.inside, False))
@@ -139,11 +149,12 @@ def _window(house: House, hole: _Hole, finish: Callable[[str], Finish], apart: b
     room = house.room_by_id[o.rooms[0]]
     frame_finish = finish(o.leaf_finish or "paint_white/0")
     outdoors = o.rooms[1] is None
-    y0 = hole.outside + (0.10 if outdoors else 0.025)
+    y0 = hole.outside + (0.10 if outdoors and not hole.tilt else 0.025)
     y1 = y0 + 0.07
-    french = o.kind == "french_window" or o.sill < 0.05
+    french = o.kind == "french_window" or (o.sill < 0.05 and not hole.tilt)
     outer_frame, sashes = _sashes(house, hole, y0, y1, french)
-    parts = [_part(hole, "reveal", "wall", finish(room.wall_finish), _tunnel(hole, y1 - 0.01, hole.inside, False))]
+    inner = finish(room.ceiling_finish if hole.tilt else room.wall_finish)
+    parts = [_part(hole, "reveal", "wall", inner, _tunnel(hole, y1 - 0.01, hole.inside, bool(hole.tilt)))]
     outer = finish(facade_finish(house)) if outdoors else finish(room.wall_finish)
     parts.append(_part(hole, "reveal", "wall", outer, _tunnel(hole, hole.outside, y0, True), tag="#outer"))
     materials = {"frame": frame_finish, "glass": PANE_FINISH, "handle": FITTING_METAL}
@@ -156,7 +167,7 @@ def _window(house: House, hole: _Hole, finish: Callable[[str], Finish], apart: b
             parts.append(_part(hole, piece, "opening", material, *shapes))
     if french:
         parts += _threshold(house, hole, y1, hole.inside, finish)
-    else:
+    elif not hole.tilt:
         w, inside, low, top = hole.length, hole.inside, o.sill - 0.002, o.sill + 0.022
         board = [
             box([0.0, y1, low], [w, inside, top]),

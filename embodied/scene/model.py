@@ -35,6 +35,7 @@ from embodied.scene.doors import Hung
 from embodied.scene.house_meshes import Part, house_parts, owners
 from embodied.scene.landscapes import scenery_of
 from embodied.scene.lit_pages import LitMesh, LitPages
+from embodied.scene.roof import ceiling_boxes
 from embodied.scene.shell import shell_parts
 
 if TYPE_CHECKING:
@@ -206,7 +207,8 @@ def build_spec(
         _add_insides(spec, cases, lying)
     if collisions:
         _add_collisions(spec, house, catalogue, bodies, cases, YIELDING if hung else ())
-        _add_leaves(spec, shell, hung)
+        roof = tuple(f"{o.id}/" for o in house.openings if o.kind == "roof_window")  # closed by ceiling_boxes
+        _add_leaves(spec, [p for p in shell if not p.owner.startswith(roof)], hung)
     return spec
 
 
@@ -264,9 +266,10 @@ def _free_body(spec: mujoco.MjSpec, p: Placement) -> mujoco.MjsBody:
     return body
 
 
-def yaw_quat(yaw: float) -> list[float]:
-    """w x y z of a turn about z."""
-    return [math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
+def yaw_quat(yaw: float, tilt: float = 0.0) -> list[float]:
+    """w x y z of a turn about z, after one about x."""
+    (c, s), (d, t) = ((math.cos(a / 2), math.sin(a / 2)) for a in (yaw, tilt))
+    return [c * d, c * t, s * t, s * d]
 
 
 def _add_parts(spec: mujoco.MjSpec, bodied: Sequence[tuple[Part, Hung | None]]) -> None:
@@ -477,6 +480,7 @@ def _add_collisions(
         _add_boxes(spec.worldbody, f"{room.id}/floor", collision.floor_boxes(house, room))
         for i in range(len(room.polygon)):
             _add_boxes(spec.worldbody, f"{room.id}/wall_{i}", collision.wall_boxes(house, room, i))
+        _add_boxes(spec.worldbody, f"{room.id}/ceiling", tuple(ceiling_boxes(house, room)))
     for stair in house.stairs:
         _add_boxes(spec.worldbody, f"{stair.id}/stairs", stairs.stair_boxes(house, stair))
     known: dict[tuple, tuple[collision.CollisionBox, ...]] = {}
@@ -539,4 +543,4 @@ def _add_boxes(
     for k, box in enumerate(boxes, first):
         x, y, z = box.centre
         pos = [position[0] + c * x - s * y, position[1] + s * x + c * y, position[2] + z]
-        body.add_geom(name=f"{owner}#box{k}", **kind, pos=pos, quat=yaw_quat(yaw + box.yaw), size=box.half)
+        body.add_geom(name=f"{owner}#box{k}", **kind, pos=pos, quat=yaw_quat(yaw + box.yaw, box.tilt), size=box.half)

@@ -10,8 +10,9 @@ from scipy.spatial import ConvexHull
 
 from embodied.assets.built.primitives import Shape, bar, box, extruded, facets, flat, joined, part, quads, sheet, tube
 from embodied.assets.records import Finish
-from embodied.house.house import House
+from embodied.house.house import House, Room
 from embodied.house.shapes import inward, room_union
+from embodied.scene import roof
 from embodied.scene.buildings import DOOR, LIT, PANE, ROOF, TRIM, WALL, Faces, faces_of
 from embodied.scene.landscapes import GROUND_DROP, STREET, Scenery, near_buildings, plot, scenery_of, side_frame
 from embodied.scene.part import Part
@@ -357,20 +358,27 @@ def _storey_shell(house: House, k: int, drop: float) -> tuple[list[Shape], list[
     last = k + 1 == len(house.storeys)
     high = storey.elevation + storey.height + 0.25 if last else house.storeys[k + 1].elevation
     outline = footprint(house, k)
-    openings = [o for o in house.openings if o.rooms[1] is None and house.room_by_id[o.rooms[0]].storey == k]
-    walls = []
-    for polygon in shapely.get_parts(outline):
+    out = house.outer_wall - house.inner_wall / 2
+    own = [o for o in house.openings if house.room_by_id[o.rooms[0]].storey == k and o.kind != "roof_window"]
+    openings = [(o, out if o.rooms[1] is None else 0.0) for o in own]
+    low_rooms = [(r, roof.covered(house, r)) for r in house.rooms if r.storey == k and r.slopes]
+    grown = [area.buffer(1e-3, join_style="mitre") for _, area in low_rooms]
+    upright = outline.difference(shapely.union_all(grown)) if grown else outline
+    walls, parts = [], shapely.get_parts(upright).tolist()
+    rooms: list[Room | None] = [*([None] * len(parts)), *(r for r, _ in low_rooms)]
+    for polygon, room in zip([*parts, *(area for _, area in low_rooms)], rooms, strict=True):
         polygon = shapely.geometry.polygon.orient(polygon)
         for ring in [polygon.exterior, *polygon.interiors]:
             points = np.asarray(ring.coords)[:-1][::-1]
             for p, q in zip(points, np.roll(points, -1, axis=0)):
-                holes = [hole_on(p, q, o, storey.elevation, house.outer_wall - house.inner_wall / 2) for o in openings]
-                walls.append(wall_face(p, q, low, high, sorted(h for h in holes if h is not None)))
+                holes = sorted(h for o, t in openings if (h := hole_on(p, q, o, storey.elevation, t)) is not None)
+                face = roof.face(house, room, p, q, low, holes, up=roof.ROOF) if room is not None else None
+                walls.append(face or wall_face(p, q, low, high, holes))
     above = footprint(house, k + 1) if not last else shapely.Polygon()
     below = footprint(house, k - 1) if k > 0 else shapely.Polygon()
-    lids = []
-    if not (roof := outline.difference(above)).is_empty:
-        lids.append(flat(roof, high))
+    lids = [shape for r, area in low_rooms for shape in roof.ceilings(house, r, area, roof.ROOF)]
+    if not (lid := upright.difference(above)).is_empty:
+        lids.append(flat(lid, high))
     if k > 0 and not (soffit := outline.difference(below)).is_empty:
         lids.append(flat(soffit, low, up=False))
     return walls, lids

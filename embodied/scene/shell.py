@@ -16,7 +16,7 @@ from embodied.assets.built.primitives import Shape, flat, joined, part, quads
 from embodied.assets.records import Finish
 from embodied.house.house import House, Room
 from embodied.house.shapes import opening_of, well_of
-from embodied.scene import joinery, outdoors, stairs
+from embodied.scene import joinery, outdoors, roof, stairs
 from embodied.scene.part import Part
 from embodied.scene.walls import Hole, floor_turn, hole_on, inset, turned_uv, wall_face
 
@@ -65,15 +65,18 @@ def room_parts(house: House, room: Room, finish: FinishOf) -> list[Part]:
         if room.storey == upper.storey:
             floor_area = floor_area.difference(opening_of(stair))
     turn = floor_turn(house)
+    ceiling = joined(*roof.ceilings(house, room, ceiling_area)) if room.slopes else flat(ceiling_area, z1, up=False)
     parts = [
         _part(f"{room.id}/floor", "floor", room, finish(room.floor_finish), turned_uv(flat(floor_area, z0), turn)),
-        _part(f"{room.id}/ceiling", "ceiling", room, finish(room.ceiling_finish), flat(ceiling_area, z1, up=False)),
+        _part(f"{room.id}/ceiling", "ceiling", room, finish(room.ceiling_finish), ceiling),
     ]
     ring = inset(room.polygon, house.inner_wall / 2)
     along = 0.0
     for i, (p, q) in enumerate(zip(ring, np.roll(ring, -1, axis=0))):
         key = room.accent_finish if i == room.accent_wall and room.accent_finish else room.wall_finish
-        face = wall_face(p, q, z0, z1, holes_of(house, room, p, q), along)
+        holes = holes_of(house, room, p, q)
+        low = roof.face(house, room, p, q, z0, holes, along) if room.slopes else None
+        face = low or wall_face(p, q, z0, z1, holes, along)
         parts.append(_part(f"{room.id}/wall_{i}", "wall", room, finish(key), face))
         along += float(np.linalg.norm(q - p))
     skirting = skirting_of(house, room)
@@ -94,7 +97,11 @@ def holes_of(house: House, room: Room, p: np.ndarray, q: np.ndarray, casings: bo
     z, length = house.storey_of(room).elevation, float(np.linalg.norm(q - p))
     holes = []
     for o in house.openings:
-        if room.id in o.rooms and (hole := hole_on(p, q, o, z, house.inner_wall / 2)) is not None:
+        if (
+            room.id in o.rooms
+            and o.kind != "roof_window"
+            and (hole := hole_on(p, q, o, z, house.inner_wall / 2)) is not None
+        ):
             s0, low, s1, high = hole
             margin = joinery.casing_width(o) if casings else 0.0
             holes.append((max(0.0, s0 - margin), low, min(length, s1 + margin), high))

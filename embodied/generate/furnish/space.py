@@ -18,7 +18,7 @@ import shapely
 
 from embodied.assets.records import Asset
 from embodied.house.house import DOORS, House, Opening, Room, Stair
-from embodied.house.shapes import opening_of
+from embodied.house.shapes import HEADROOM, opening_of, under_slopes
 from embodied.navigation.free_space import LOW
 
 Params = tuple[tuple[str, str | float], ...]
@@ -170,7 +170,7 @@ class RoomSpace:
     height: float
     polygon: shapely.Polygon
     ceiling: shapely.Geometry
-    """`polygon`, without the opening of stairs that lead up."""
+    """`polygon`, without the opening of stairs that lead up and where it slopes."""
     walls: tuple[Wall, ...]
     entries: tuple[tuple[float, float], ...]
     """Spots where one stands after each door, metres."""
@@ -206,7 +206,9 @@ class RoomSpace:
         return sorted(self.walls, key=lambda w: -w.length)
 
     def inside(self, b: Box) -> bool:
-        """True if the box stays between the walls, a millimetre forgiven."""
+        """True if the box stays between the walls and under slopes, a millimetre forgiven."""
+        if self.room.slopes and b.top > self.bottom + self.room.clear_height(self.height, b.corners()).min() + TOUCH:
+            return False
         if self.rectangle is not None:
             x0, y0, x1, y1 = self.rectangle
             return x0 <= b.x - b.reach_x and b.x + b.reach_x <= x1 and y0 <= b.y - b.reach_y and b.y + b.reach_y <= y1
@@ -317,7 +319,7 @@ def room_space(house: House, room: Room) -> RoomSpace:
     storey = house.storey_of(room)
     floor = shapely.remove_repeated_points(house.floor(room).simplify(1e-4))
     floor = shapely.orient_polygons(floor)
-    openings = tuple(o for o in house.openings if room.id in o.rooms)
+    openings = tuple(o for o in house.openings if room.id in o.rooms and o.kind != "roof_window")
     walls = _walls(floor, openings, house.inner_wall)
     x0, y0, x1, y1 = floor.bounds
     roomy = floor.area > 6.5 and min(x1 - x0, y1 - y0) > 2.75
@@ -329,7 +331,8 @@ def room_space(house: House, room: Room) -> RoomSpace:
             keepouts.extend(_opening_keepouts(wall, s0, s1, o, room, storey.elevation, floor.area))
             if o.kind in DOORS:
                 entries.append(wall.point((s0 + s1) / 2, radius + 0.1))
-    wells = [opening_of(s) for s in house.stairs if s.rooms[0] == room.id]
+    wells = [opening_of(s) for s in house.stairs if s.rooms[0] == room.id] + under_slopes(room, storey.height)
+    standing = floor.difference(shapely.union_all(under_slopes(room, HEADROOM))) if room.slopes else floor
     flights = [
         b
         for stair in house.stairs
@@ -350,7 +353,7 @@ def room_space(house: House, room: Room) -> RoomSpace:
         entries=tuple(entries),
         keepouts=(*keepouts, *flights),
         radius=radius,
-        walk=_free_cells(floor, radius, shape, origin),
+        walk=_free_cells(standing, radius, shape, origin),
         origin=origin,
         grown=grown,
         convex=floor.convex_hull.area - floor.area < 1e-4,
@@ -457,11 +460,11 @@ def _stair_keepouts(stair: Stair, upstairs: bool, z: float, height: float) -> li
             continue
         (x0, y0), (x1, y1) = np.min(ring, axis=0), np.max(ring, axis=0)
         boxes.append(box((x0 + x1) / 2, (y0 + y1) / 2, x1 - x0, y1 - y0, 0.0, z, z + height))
-    for (ax, ay, _), (bx, by, _) in itertools.pairwise(path):
+    for (ax, ay, az), (bx, by, bz) in itertools.pairwise(path):
         length = math.hypot(bx - ax, by - ay)
         if length < 1e-6:
             continue
-        yaw = math.atan2(by - ay, bx - ax)
+        yaw, length = math.atan2(by - ay, bx - ax), length + stair.width * (az == bz)  # all of a landing
         boxes.append(box((ax + bx) / 2, (ay + by) / 2, length, stair.width + 0.06, yaw, z, z + height))
     for end, next_ in ((path[0], path[1]), (path[-1], path[-2])):
         length = math.hypot(next_[0] - end[0], next_[1] - end[1]) or 1.0

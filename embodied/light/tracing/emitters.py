@@ -14,13 +14,13 @@ import numpy as np
 from embodied.assets.cache import write_bytes
 from embodied.assets.decoding import open_arrays, packed
 from embodied.geometry import r2
-from embodied.house.house import House, Opening
-from embodied.house.shapes import inward
+from embodied.house.house import GLAZED, House, Opening
+from embodied.house.shapes import inward, slope_over
 from embodied.light.backend import Array, RayScene, accumulate, dr, fraction, mi, opaque_float, vector
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.unwrap import areas_of, face_normals
+from embodied.scene.walls import ROOF
 
-GLAZED = ("window", "french_window")
 GLAZING = 0.88
 """Share of light that clean double glazing lets through."""
 UNIT = 100.0
@@ -69,7 +69,7 @@ class Lamp:
 
 
 def portals_of(house: House) -> tuple[Portal, ...]:
-    """One portal per glazed or open hole to the outdoors, in the plane of the outer face of the wall."""
+    """One portal per glazed or open hole to the outdoors, in the plane of the outer face of wall or roof."""
     lets_in = lambda o: o.kind in GLAZED or o.kind == "passage" or o.angle > 0.05
     return tuple(_portal(house, o) for o in house.openings if None in o.rooms and lets_in(o))
 
@@ -80,7 +80,12 @@ def _portal(house: House, o: Opening) -> Portal:
     left = np.array([-d[1], d[0]])
     if left @ inward(house, o) < 0:
         a, b, left = b, a, -left
-    z = house.storey_of(house.room_by_id[o.rooms[0]]).elevation
+    room = house.room_by_id[o.rooms[0]]
+    z = house.storey_of(room).elevation
+    if o.kind == "roof_window":
+        _, way, knee = slope_over(room, o)
+        corner = np.array([*(a + (o.sill - knee - ROOF / 2) * way), z + o.sill + ROOF / 2])
+        return Portal(o.id, room.id, corner, np.array([*(b - a), 0.0]), np.array([*way, 1.0]) * (o.head - o.sill))
     # the facade stands outer_wall beyond the inner face, which lies half an inner wall inside the centre line
     out = left * -(house.outer_wall - house.inner_wall / 2)
     corner = np.array([*(a + out), z + o.sill])
