@@ -50,7 +50,7 @@ class DatasetOptions(Furnished, Printed):
     area: Annotated[tuple[float, float], Option(metavar=("LOW", "HIGH"))] = (150.0, 420.0)
     """Size of the houses in square metres."""
     storeys: Annotated[int, Option(whole(0, 3), "N")] = 1
-    """Storeys of every house, 0: drawn from its seed (all kinds but vqa)."""
+    """Storeys of every house, 0: drawn from its seed."""
     language: Annotated[str, Option(words=("people", "landmarks", "plain"))] = "people"
     """Wording of the routes: varied, with habits and landmarks (people), always with landmarks, of paths on which turns
     alone lead astray (landmarks), or plain turns and rooms (plain)."""

@@ -43,7 +43,7 @@ def make(args: DatasetOptions) -> None:
     questions = {split: given[split][1] or PER_HOUSE * n for split, n in houses.items()}
     check_machine(pictures)
     watch = lambda jobs, total: tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
-    config = VqaConfig(houses, questions, args.seed, args.area, pictures, seeds)
+    config = VqaConfig(houses, questions, args.seed, args.area, pictures, seeds, args.storeys or None)
     about = build_vqa(config, args.out, args.cache, guessed, workers=args.workers, watch=watch).about
     lines = [f"{split}: {sum(c.values())} questions of {len(c)} types" for split, c in about["counts"].items()]
     show(args, {"folder": str(args.out), **about}, "\n".join([*lines, f"digest {about['digest'][:16]}, in {args.out}"]))

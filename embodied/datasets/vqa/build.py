@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,30 +18,36 @@ import shapely
 
 from embodied.assets.cache import digest, drafts, write_json
 from embodied.assets.catalogue import Catalogue, load_catalogue
+from embodied.assets.moving_parts import openness_of
 from embodied.datasets.build import Watch, for_each_unit, make_dataset_house
 from embodied.datasets.checks import DatasetError
-from embodied.datasets.vqa.scene import WalkScene, easily_moved
+from embodied.datasets.vqa.scene import WalkScene, movable
 from embodied.datasets.vqa.scoring import VqaQuestion, less_guessed, thinned
 from embodied.datasets.vqa.types import CHANGE, TYPES
-from embodied.datasets.vqa.walks import Walk, cameras, film, look_around, tour, view_of
+from embodied.datasets.vqa.walks import TURN, Walk, cameras, film, look_around, tour, view_of
 from embodied.generate import HouseConfig
-from embodied.generate.left_open import left_open
+from embodied.generate.left_open import free_openness, left_open
 from embodied.generate.people import CLASS, add_people, place_people
-from embodied.house.house import House
+from embodied.house.contents import stocked
+from embodied.house.house import House, Placement
+from embodied.house.moment import Moment, RigidPose
 from embodied.locks import locked
 from embodied.navigation.connectivity import from_matterport, to_matterport
 from embodied.navigation.graph import NavGraph
 from embodied.records import from_plain, load_lines, read_json, save_lines, to_json
 from embodied.render.pictures import parse_pictures
-from embodied.scene.model import loose
+from embodied.scene.model import takeable
 from embodied.seeds import stream
 from embodied.world import World
 
 WALKS, CHANGES, ROOMS, SPARE, WRITERS = 2, 2, 4, 6, 3
 """Walks through a house; its rooms that are visited twice; most rooms of each walk; times as many questions as are
 wanted that are drawn; people who ask."""
-MOVED_BY = 1.0
-"""How far something is moved between two visits, and ends from the camera, metres."""
+OPENED, OPENED_BY = 6, 0.5
+"""Pieces of furniture that are opened for walks through a house, and how far at least."""
+CHANGED, MOVED_BY, ABOVE = 2, 1.0, 0.2
+"""Most things that are moved or taken away between two visits; how far from where they were, from the camera and from
+each other they are put; how far above the ceiling is what is taken away, metres."""
 
 Judge = Callable[[Sequence[VqaQuestion], int], np.ndarray]
 """A further blind model, of all types together: questions and a seed to (2, n) scores and how sure it is."""
@@ -49,7 +56,7 @@ Judge = Callable[[Sequence[VqaQuestion], int], np.ndarray]
 @dataclass(frozen=True)
 class VqaConfig:
     """All that a set of questions depends on: number of houses, and most questions, of each split; the area of a house,
-    m2; how frames are drawn; seeds of the houses of a hidden split."""
+    m2, and its storeys (None: drawn); how frames are drawn; seeds of the houses of a hidden split."""
 
     houses: Mapping[str, int]
     questions: Mapping[str, int]
@@ -57,6 +64,7 @@ class VqaConfig:
     area: tuple[float, float] = (45.0, 80.0)
     pictures: str = "fast"
     seeds: tuple[int, ...] = ()
+    storeys: int | None = 1
 
 
 def build_vqa(
@@ -94,17 +102,25 @@ def film_house(which: tuple[str, int], config: VqaConfig, folder: Path, cache: P
         return name
     home.parent.mkdir(parents=True, exist_ok=True)
     seed = config.seeds[which[1]] if config.seeds else config.seed
-    house, graph = make_dataset_house(seed, name, HouseConfig(area=config.area), catalogue)
+    settings = HouseConfig(area=config.area, storeys=config.storeys, special=())
+    house, graph = make_dataset_house(seed, name, settings, catalogue)
     rng, pictures = stream(seed, "vqa", name), parse_pictures(config.pictures)
     house = lived_in(house, graph, catalogue, rng)
+    free = free_openness(house, catalogue)
     with drafts(home.parent) as private, World(house, catalogue, graph, cache, pictures) as world:
         views = {p.id: view_of(world, p) for p in house.placements if p.object_class == CLASS}
-        for k in range(WALKS):
-            path, stops = tour(house, graph, ROOMS, rng=rng)
-            track, to = cameras(graph, path, stops, rng.uniform(-np.pi, np.pi)), private / name / f"walk_{k}"
-            rooms = tuple(graph.room_of_node[n] for n in stops)
-            walk = Walk(f"{name}_{k}", name, rooms, tuple(film(world, [*track], to)), views=views)
+        walks = [tour(house, graph, ROOMS, rng=rng) for _ in range(WALKS)]
+        world.show(
+            Moment(openness=opened(world, free, {graph.room_of_node[n] for _, stops in walks for n in stops}, rng))
+        )
+        for k, (path, stops) in enumerate(walks):
+            track, to = [*cameras(graph, path, stops, rng.uniform(-np.pi, np.pi))], private / name / f"walk_{k}"
+            track += look_around(track[-1][0], track[-1][1] + TURN)[: rng.integers(12)]  # it ends with any view
+            rooms, frames = tuple(graph.room_of_node[n] for n in stops), tuple(film(world, track, to))
+            walk = Walk(f"{name}_{k}", name, rooms, frames, openness=world.moment.openness, views=views)
             write_json(to / "walk.json", dataclasses.asdict(walk))
+        rooms_of_movables = [house.placement_by_id[i].room for i in sorted(movable(house, catalogue))]
+        stops = sorted(walks[-1][1], key=lambda n: -rooms_of_movables.count(graph.room_of_node[n]))
         for k, node in enumerate(stops[:CHANGES], WALKS):
             to = private / name / f"walk_{k}"
             walk = two_visits(world, node, to, f"{name}_{k}", rng)
@@ -123,26 +139,48 @@ def lived_in(house: House, graph: NavGraph, catalogue: Catalogue, rng: np.random
     return add_people(left_open(untidy, catalogue).applied(house), met, rooms.values())
 
 
+def opened(world: World, free: Mapping[str, float], rooms: Set[str], rng: np.random.Generator) -> dict[str, float]:
+    """How far doors and drawers of a few pieces of furniture in these rooms are open during walks, by name."""
+    shut = {p.id for p in world.house.placements if p.room in rooms and not openness_of(p.params)}
+    wide = [n for n, x in sorted(free.items()) if x > OPENED_BY and n.partition("/")[0] in shut]
+    one_each = {
+        n.partition("/")[0]: n for n in rng.permutation(wide).tolist() if re.search("door|drawer", n.partition("/")[2])
+    }
+    return {n: round(float(rng.uniform(OPENED_BY, free[n])), 3) for n in [*one_each.values()][:OPENED]}
+
+
 def two_visits(world: World, node: int, to: Path, name: str, rng: np.random.Generator) -> Walk:
-    """Film two looks around at a node, with something moved in its room between them; nothing where nothing can be."""
+    """Film two looks around at a node, between which things of its room are moved or, small ones, taken away; the first
+    look alone where there are none."""
     eye, room = world.graph.positions[node], world.graph.room_of_node[node]
+    world.show(Moment())
     track = look_around(eye, rng.uniform(-np.pi, np.pi))
-    frames = [*film(world, track, to)]
-    floor = world.house.floor(world.house.room_by_id[room])
-    low, high = np.reshape(floor.bounds, (2, 2))
-    can = sorted(loose(world.house, world.catalogue))
-    moved = [p for p in map(world.house.placement_by_id.get, can) if p and p.room == room and easily_moved(p)]
-    moved = [p for p in moved if any(p.id in f.clear for f in frames)]
-    for p in rng.permutation(np.array(moved, dtype=object)).tolist():
-        for spot in rng.uniform(low, high, (100, 2)):
-            body, apart = max(p.size[:2]) / 2, (math.dist(spot, at) for at in (p.position[:2], eye[:2]))
-            around = [world.is_free(spot + body * np.array([math.cos(a), math.sin(a)])) for a in np.arange(0, 6, 1.0)]
-            if min(apart) > MOVED_BY and all(around) and floor.contains(shapely.Point(spot)):
-                world.move(p.id, (*spot, p.position[2]), p.yaw)
-                frames += film(world, track, to, len(frames))
-                world.undo()
-                return Walk(name, world.name, (room,), tuple(frames), moved=p.id)
-    return Walk(name, world.name, (room,), tuple(frames))
+    frames, spots = [*film(world, track, to)], dict[str, np.ndarray]()
+    small, seen = takeable(world.house, world.catalogue), {i for f in frames for i in f.clear}
+    storey = world.house.storey_of(world.house.room_by_id[room])
+    for i in rng.permutation(sorted(seen & movable(world.house, world.catalogue))).tolist():
+        p = world.house.placement_by_id[i]
+        if p.room == room and p.parent not in spots and len(spots) < CHANGED:
+            away = np.array([*p.position[:2], storey.elevation + storey.height + ABOVE])  # where nobody sees it
+            spot = away if i in small else free_spot(world, p, [eye, *spots.values()], rng)
+            spots |= {} if spot is None else {i: spot}
+    yaw = {i: world.house.placement_by_id[i].yaw for i in spots}
+    world.show(Moment(moved={i: RigidPose.upright((x, y, z), yaw[i]) for i, (x, y, z) in spots.items()}))
+    frames += film(world, track, to, len(frames)) if spots else []
+    return Walk(name, world.name, (room,), tuple(frames), moved=tuple(spots))
+
+
+def free_spot(world: World, p: Placement, others: Sequence[np.ndarray], rng: np.random.Generator) -> np.ndarray | None:
+    """(3,) metres: free floor of its room to which a thing can be moved, MOVED_BY from where it was and from others."""
+    floor = world.house.floor(world.house.room_by_id[p.room])
+    for spot in rng.uniform(*np.reshape(floor.bounds, (2, 2)), (100, 2)):
+        around = [
+            (*(spot + max(p.size[:2]) / 2 * np.array([math.cos(a), math.sin(a)])), others[0][2]) for a in range(6)
+        ]
+        far = min(math.dist(spot, at[:2]) for at in (p.position, *others)) > MOVED_BY
+        if far and floor.contains(shapely.Point(spot)) and all(map(world.is_free, around)):
+            return np.array([*spot, p.position[2]])
+    return None
 
 
 def scenes_of(folder: Path, split: str, houses: int, cache: Path) -> list[WalkScene]:
@@ -151,7 +189,8 @@ def scenes_of(folder: Path, split: str, houses: int, cache: Path) -> list[WalkSc
     for home in (folder / "houses" / f"{split}_{i:04d}" for i in range(houses)):
         house, graph = House.load(home / "house.json"), from_matterport(home / "connectivity.json")
         walks = [from_plain(Walk, read_json(file)) for file in sorted(home.glob("walk_*/walk.json"))]
-        scenes += [WalkScene(walk, house, graph, catalogue) for walk in walks]
+        now = [stocked(Moment(openness=w.openness).applied(house), catalogue) if w.openness else house for w in walks]
+        scenes += [WalkScene(walk, shown, graph, catalogue) for walk, shown in zip(walks, now)]
     shown = [(s.house.name, name) for s in scenes for name in sorted({p.object_class for p in s.things})]
     rests = {(s.carrier_of(p), p.object_class) for s in scenes for p in s.house.placements if p.parent is not None}
     for scene in scenes:
@@ -186,7 +225,7 @@ def unguessed(config: VqaConfig, left: dict[str, list[VqaQuestion]], network: Ju
 def asked_about(scene: WalkScene, most: int, seed: int) -> list[VqaQuestion]:
     """Up to so many questions of every type about a walk, no answer too often, in the words of several people."""
     questions: dict[tuple[str, ...], VqaQuestion] = {}
-    types = [name for name in TYPES if (name == CHANGE) == (scene.walk.moved is not None)]
+    types = [name for name in TYPES if (name == CHANGE) == bool(scene.walk.moved)]
     for name, writer in itertools.product(types, range(WRITERS)):
         s, answers = scene.asked(name, stream(seed, "questions", scene.walk.name, name, writer)), Counter[str]()
         for q in TYPES[name](s):
@@ -194,8 +233,8 @@ def asked_about(scene: WalkScene, most: int, seed: int) -> list[VqaQuestion]:
             if answers.total() * WRITERS >= most:
                 break
             if len({*q.options}) == len(q.options) and answers[q.answer] * WRITERS * max(len(q.options), 1) < most:
-                answers[q.answer] += (name, *q.about) not in questions
-                questions.setdefault((name, *q.about), dataclasses.replace(q, id=number))
+                answers[q.answer] += (about := (name, q.fact, *q.about)) not in questions
+                questions.setdefault(about, dataclasses.replace(q, id=number))
     return [*questions.values()]
 
 

@@ -14,9 +14,10 @@ from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import read_toml
 from embodied.assets.people.figures import person_of
 from embodied.datasets.vqa.scoring import VqaQuestion
-from embodied.datasets.vqa.walks import GLIMPSE, Walk
+from embodied.datasets.vqa.walks import GLIMPSE, OPEN_KINDS, Walk
 from embodied.generate.people import CLASS
 from embodied.geometry import rotation, wrap
+from embodied.house.contents import STORED
 from embodied.house.house import House, Placement
 from embodied.house.moment import apart
 from embodied.house.shapes import footprint
@@ -25,6 +26,7 @@ from embodied.language.clauses import Referent
 from embodied.language.lexicon import ROOM_NOUNS, UNFIT, Word, lexicon_of, says
 from embodied.language.plain_language import plural, with_article
 from embodied.navigation.graph import NavGraph
+from embodied.scene.model import loose, takeable
 
 ASKING: Mapping[str, Any] = read_toml(Path(templates.__file__).with_name("vqa.toml"))
 """Type to habit to templates; and 'alike', groups of classes that people do not tell apart."""
@@ -34,14 +36,16 @@ ALIKE: Mapping[str, list[str]] = {name: group for group in ASKING["alike"] for n
 EASILY_MOVED = ("chair", "stool", "plant", "basket", "box", "bag", "table", "toy", "horse", "suitcase", "stand", " bin")
 LEAST_MOVED = 0.3
 """Parts of the names of classes of what is moved between two visits, and its longest side at least, metres."""
+FLOORS = {1: ("",), 2: ("ground", "upper"), 3: ("ground", "middle", "top")}
+"""Storeys, by how many there are."""
 
 
 class WalkScene:
     """All that questions about a walk rest on, and who asks: `by` draws from `rng`.
 
-    `clear`, `glimpsed`: what is seen clearly, and at all, to the first frame that shows it; `rooms`: those that their
-    kind tells from all others; `elsewhere` and `rests`: classes that walks through other houses show, and pairs of a
-    class and what rests on it somewhere.
+    `clear`, `glimpsed`: what is seen clearly, and perhaps, to the first frame that shows it; `rooms`: those that kind
+    and storey tell from all others; `elsewhere` and `rests`: classes that walks through other houses show, and pairs of
+    a class and what rests on it somewhere.
     """
 
     def __init__(self, walk: Walk, house: House, graph: NavGraph, catalogue: Catalogue) -> None:
@@ -52,11 +56,13 @@ class WalkScene:
         self._called: dict[str, list[Placement]] = {}
         self.clear = _firsts(f.clear for f in walk.frames)
         self.glimpsed = _firsts([o for o, share in f.shares.items() if share >= GLIMPSE] for f in walk.frames)
+        self.glimpsed |= {p.id: 0 for p in house.placements if (p.group or "").startswith(STORED)}
+        self.movable = movable(house, catalogue)
         self.things = [p for p in house.placements if p.id in self.clear and p.object_class not in UNFIT]
         fronts = ((p, apart(catalogue.mesh, p)) for p in self.things if self._faced(p))
-        self.openable = [p for p, whole in fronts if whole and any(m.kind != "lid" for m in whole.moving)]
-        kinds = [r.kind for r in house.rooms]
-        self.rooms = {r.id: r.kind for r in house.rooms if kinds.count(r.kind) == 1}
+        self.openable = [p for p, whole in fronts if whole and any(m.kind in OPEN_KINDS for m in whole.moving)]
+        kinds = [(r.kind, r.storey) for r in house.rooms]
+        self.rooms = {r.id: kind for r, kind in zip(house.rooms, kinds) if kinds.count(kind) == 1}
         self.looked_at = [r for r in dict.fromkeys(walk.rooms) if r in self.rooms]
 
     def _faced(self, p: Placement) -> bool:
@@ -91,9 +97,12 @@ class WalkScene:
         return [p for p in self.things if p.room == room]
 
     def room_name(self, room: str) -> str:
-        """'kitchen', 'master bedroom'."""
-        nouns = ROOM_NOUNS[self.rooms[room]]
-        return nouns[0 if self.rng.random() < self.by.plainness else int(self.rng.integers(len(nouns)))]
+        """'kitchen', 'master bedroom', 'bathroom on the upper floor'."""
+        (kind, storey), every = self.rooms[room], self.house.rooms
+        nouns = ROOM_NOUNS[kind]
+        noun = nouns[0 if self.rng.random() < self.by.plainness else int(self.rng.integers(len(nouns)))]
+        floor = FLOORS[len(self.house.storeys)][storey]
+        return f"{noun} on the {floor} floor" if sum(r.kind == kind for r in every) > 1 else noun
 
     def noun(self, name: str) -> str:
         """A noun for a class, most often its own name, that stands for no other class and fits all such things of the
@@ -157,9 +166,11 @@ class WalkScene:
         return [q for q in self.called(words) if q.id in self.glimpsed]
 
 
-def easily_moved(p: Placement) -> bool:
-    light = any(word in f" {p.object_class}" for word in EASILY_MOVED)
-    return light and p.parent is None and max(p.size) > LEAST_MOVED
+def movable(house: House, catalogue: Catalogue) -> frozenset[str]:
+    """Things that may be moved or taken away between two visits: furniture that is easily moved, and small things."""
+    is_light = lambda p: any(word in f" {p.object_class}" for word in EASILY_MOVED) and p.parent is None
+    easily = {p.id for p in house.placements if is_light(p) and max(p.size) > LEAST_MOVED}
+    return loose(house, catalogue) & easily | takeable(house, catalogue)
 
 
 def _firsts(frames: Iterable[Iterable[str]]) -> dict[str, int]:

@@ -153,7 +153,9 @@ def less_guessed(questions: Questions, scores: np.ndarray, sure: np.ndarray) -> 
 def thinned(questions: Questions, seed: int) -> list[VqaQuestion]:
     """The questions of one type, of all splits, without those that blind models are surest of, until all are near
     chance in every split."""
-    before, left = 0, balanced(questions, seed)
+    splits = sorted({q.walk.partition("_")[0] for q in questions})
+    parts = [balanced([q for q in questions if q.walk.startswith(f"{name}_")], seed) for name in splits]
+    before, left = 0, [q for part in parts for q in part]
     while FEWEST_LEFT <= len(left) != before:
         before = len(left)
         judged = [cross_judged(m, left, seed + len(left)) for m in BLIND]

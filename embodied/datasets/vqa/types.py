@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 
 from embodied.assets.moving_parts import openness_of
-from embodied.datasets.vqa.scene import ALIKE, WalkScene, bearing, direction, easily_moved, gap, middle
+from embodied.datasets.vqa.scene import ALIKE, WalkScene, bearing, direction, gap, middle
 from embodied.datasets.vqa.scoring import VqaQuestion
 from embodied.datasets.vqa.walks import CLEAR_SHARE
 from embodied.geometry import facing_of
@@ -29,10 +29,9 @@ SIDE = 15.0
 """Degrees from the border between two sides within which nothing is asked."""
 LEAST_METRES, MOST_METRES, NEARER, NEARER_METRES = 0.5, 8.0, 1.25, 0.3
 """Between things whose distance is asked for; how much farther the second nearest thing is than the nearest."""
-AJAR, BEHIND, ON_FLOOR, NEXT_TO, HALVED, TRIES = 0.3, 110.0, 0.02, 0.5, "curtain", 6
-"""Openness from which a door or drawer stands open; degrees off their way from which people do not see things; metres
-below which things stand on the floor, and within which what is not on something might be taken to be; a class whose
-halves people count; times that every thing of a room is asked about with others, since some sides are rare."""
+BEHIND, NEXT_TO, HALVED, TRIES = 110.0, 0.5, "curtain", 6
+"""Degrees off their way from which people do not see things; metres within which what is not on something might be
+taken to be; a class whose halves people count; times that a thing is asked about with others."""
 SUNNY, SHADY, HIGH, LATER = math.cos(math.radians(50)), math.cos(math.radians(100)), 0.15, (7.0, 9.0, 15.0, 17.0, 19.0)
 """Cosines between where a window looks and the sun, at least of a sunny room and at most of others; the least height of
 the sun, the sine; hours that are asked about."""
@@ -71,12 +70,15 @@ def sided(s: WalkScene, angle: float, sides: Sides, about: Iterable[str], **slot
 
 
 def counting(s: WalkScene) -> Asked:
-    for room, name in s.shuffled([(p.room, p.object_class) for p in s.things if p.room in s.looked_at]):
+    """In a room, or in the whole video."""
+    rooms = [(p.room, p.object_class) for p in s.things if p.room in s.looked_at]
+    for room, name in s.shuffled([*rooms, *(("", p.object_class) for p in s.things)]):
         noun = s.noun(name)
-        there = {p.id: p.object_class for p in s.called(noun) if p.room == room}
+        there = {p.id: p.object_class for p in s.called(noun) if (p.room == room if room else p.id in s.glimpsed)}
         alone = {*there.values()} == {name} and there.keys() <= s.clear.keys()
         if 2 <= len(there) <= 12 and plural(noun) != noun and alone and name != HALVED:
-            yield s.ask(str(len(there)), (room, *there), things=plural(noun), room=s.room_name(room))
+            where = s.room_name(room) if room else "video"
+            yield s.ask(str(len(there)), (room, *there), things=plural(noun), room=where)
 
 
 def distance(s: WalkScene) -> Asked:
@@ -130,7 +132,7 @@ def order(s: WalkScene) -> Asked:
 
 
 def visibility(s: WalkScene) -> Asked:
-    shown = {i for f in s.walk.frames for i in f.shares}
+    shown = {i for f in s.walk.frames for i in f.shares} | {*s.glimpsed}
     away = {n: s.noun(n) for n in sorted({*s.elsewhere} - UNFIT)}
     unseen = [n for n in s.elsewhere if n in away and not shown & {p.id for p in s.called(away[n])}]
     often = Counter(s.elsewhere)
@@ -164,22 +166,21 @@ def carried(shelf: bool) -> QuestionType:
 
 
 def openness(s: WalkScene) -> Asked:
-    wide = {p.id: max(openness_of(p.params).values(), default=0.0) for p in s.openable}
-    shut = [p for p in s.openable if not wide[p.id]]
-    for p, name in s.named([p for p in s.openable if wide[p.id] > AJAR]):
-        wrong = s.named(shut)[:3]
-        if len(wrong) == 3:
+    wide, ajar = {p.id: openness_of(p.params) for p in s.openable}, {i for f in s.walk.frames for i in f.ajar}
+    for p, name in s.named(TRIES * [p for p in s.openable if p.id in ajar]):
+        wrong = s.named([q for q in s.openable if not wide[q.id]])[:3]
+        if len(wrong) > 1:
             about = (p.id, *(q.id for q, _ in wrong))
-            yield s.ask(name, about, [n for _, n in wrong], f"open by {wide[p.id]:.2f}")
+            yield s.ask(name, about, [n for _, n in wrong], f"open by {max(wide[p.id].values()):.2f}")
 
 
 def change(s: WalkScene) -> Asked:
     half = len(s.walk.frames) // 2
     twice = {i for f in s.walk.frames[:half] for i in f.clear} & {i for f in s.walk.frames[half:] for i in f.clear}
-    others = [p for p in s.things if p.id in twice and p.id != s.walk.moved and p.parent != s.walk.moved]
-    for p, name in s.named([p for p in s.things if p.id == s.walk.moved and p.id in twice]):
-        wrong = s.named([q for q in others if q.parent is None and q.position[2] < ON_FLOOR])[:3]
-        if wrong and easily_moved(p):
+    others = [p for p in s.things if p.id in twice & s.movable and not {p.id, p.parent} & {*s.walk.moved}]
+    for p, name in s.named(TRIES * [p for p in s.things if p.id in s.walk.moved]):
+        wrong = s.named([q for q in others if q.room == p.room])[:3]
+        if len(wrong) > 1:
             yield s.ask(name, (p.id, *(q.id for q, _ in wrong)), [n for _, n in wrong])
 
 
@@ -208,19 +209,24 @@ def side_of_person(s: WalkScene) -> Asked:
 
 
 def sun(s: WalkScene) -> Asked:
-    """The room whose window looks at the sun at another hour; into the others it cannot shine."""
-    for hour in LATER:
-        towards = sun_direction(dataclasses.replace(s.house.sky, hour=hour))
-        of_room: dict[str, list[float]] = {r: [SHADY - 1] for r in s.looked_at}
-        for o in s.house.openings:
-            if o.rooms[1] is None and o.rooms[0] in of_room and o.kind not in HINGED:
-                of_room[o.rooms[0]].append(float(-inward(s.house, o) @ towards[:2] / math.hypot(*towards[:2])))
-        shady = [r for r, cosines in of_room.items() if max(cosines) < SHADY]
-        sunny = [r for r, cosines in of_room.items() if max(cosines) > SUNNY]
-        fair = towards[2] > HIGH and s.house.sky.weather != "overcast" and abs(hour - s.house.sky.hour) > 1
-        if len(sunny) == 1 and shady and fair:
-            slots = {"now": f"{s.house.sky.hour:.0f}", "hour": f"{hour:.0f}"}
-            yield s.ask(s.room_name(sunny[0]), sunny, [s.room_name(r) for r in shady[:3]], **slots)
+    """A room into which the sun shines at another hour; into the others it cannot. The video shows where it is now."""
+    sky, windows = s.house.sky, [o for o in s.house.openings if o.rooms[1] is None and o.kind not in HINGED]
+
+    def lit_at(hour: float) -> dict[str, float]:
+        """Rooms to the cosine between the sun and where the window looks that faces it most."""
+        towards = sun_direction(dataclasses.replace(sky, hour=hour))
+        flat = towards[:2] / math.hypot(*towards[:2]) * (towards[2] > HIGH)
+        faced = [(o.rooms[0], float(-inward(s.house, o) @ flat)) for o in windows]
+        return {r: max([SHADY - 1, *(c for room, c in faced if room == r)]) for r in s.looked_at if flat.any()}
+
+    told = sky.weather != "overcast" and max(lit_at(sky.hour).values(), default=0) > SUNNY
+    for hour in s.shuffled([h for h in LATER if abs(h - sky.hour) > 1 and told]):
+        of_room = lit_at(hour)
+        shady = [r for r, cosine in of_room.items() if cosine < SHADY]
+        for room in [r for r, cosine in of_room.items() if cosine > SUNNY] if shady else ():
+            about, slots = (room, *shady[:3]), {"now": f"{sky.hour:.0f}", "hour": f"{hour:.0f}"}
+            names = [s.room_name(r) for r in about]
+            yield s.ask(names[0], about, names[1:], f"at {hour:.0f}:00", **slots)
 
 
 def next_step(s: WalkScene) -> Asked:
@@ -237,15 +243,17 @@ def next_step(s: WalkScene) -> Asked:
 def route(s: WalkScene) -> Asked:
     """Turns on a way of two or three straight legs, with things to stop at."""
     spots = s.graph.positions[:, :2]
-    at = {n: [t for t in s.things if footprint(t).distance(shapely.Point(xy)) < STANDS] for n, xy in enumerate(spots)}
-    ends = [n for n, room in enumerate(s.graph.room_of_node) if at[n] and room in s.walk.rooms]
+    room_of, near = s.graph.room_of_node, lambda t, n: footprint(t).distance(shapely.Point(spots[n])) < STANDS
+    at = {n: [t for t in s.things if t.room == room and near(t, n)] for n, room in enumerate(room_of)}
+    ends = [n for n, room in enumerate(room_of) if at[n] and room in s.walk.rooms]
     for way in (s.graph.path(*pair) for pair in s.shuffled([*itertools.permutations(ends, 2)])[:ROUTES]):
         bends = [
             (b, bearing(spots[b], direction(spots[a], spots[b]), spots[c])) for a, b, c in zip(way, way[1:], way[2:])
         ]
         turns = [(n, angle) for n, angle in bends if abs(angle) >= STRAIGHT]
         stops = [thing for n in (way[0], *(n for n, _ in turns), way[-1]) for thing in s.named(at[n])[:1]]
-        if not 1 <= len(turns) <= 2 or min(abs(angle) for _, angle in turns) < CORNER:
+        stairs = len({s.house.room_by_id[room_of[n]].storey for n in way}) > 1
+        if stairs or not 1 <= len(turns) <= 2 or min(abs(angle) for _, angle in turns) < CORNER:
             continue
         at_things = [middle(t) for t, _ in stops]
         seen = [bearing(b, direction(a, b), c) for a, b, c in zip(at_things, at_things[1:], at_things[2:])]

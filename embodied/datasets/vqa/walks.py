@@ -13,8 +13,10 @@ import shapely
 
 from embodied.assets.cache import write_bytes
 from embodied.assets.decoding import read_picture
+from embodied.assets.moving_parts import openness_of
 from embodied.geometry import facing_of, rectangle, wrap
 from embodied.house.house import House, Placement
+from embodied.house.moment import RigidPose, apart
 from embodied.navigation.graph import NavGraph
 from embodied.records import RecordError
 from embodied.render.camera import camera_at
@@ -30,30 +32,36 @@ and at least WHOLE of the outline of its box shows it. With less than GLIMPSE in
 question is about what lies between."""
 EYES = 0.93
 """Height of people's eyes, of their height as they stand or sit."""
+AJAR, MOSTLY, OPEN_KINDS = 0.3, 0.4, ("door", "flap", "drawer")
+"""Openness from which a door or drawer stands open, and the share of it that must be in view."""
 Camera = tuple[np.ndarray, float]
 """(3,) position, metres, and yaw, radians."""
 
 
 @dataclass(frozen=True)
 class WalkFrame:
-    """One picture: `shares` of its pixels by placement; `clear` are those that count as seen."""
+    """One picture: `shares` of its pixels by placement; `clear` are those that count as seen,
+    `ajar` furniture of which it shows a door or drawer that stands open."""
 
     position: tuple[float, float, float]
     yaw: float
     shares: Mapping[str, float]
     clear: tuple[str, ...] = ()
+    ajar: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Walk:
     """walk.json: a walk through `rooms`, with a look around in each; or two looks around in one, between which `moved`
-    was moved. `views` are what people see who stand or sit in the house: shares of a picture from their eyes."""
+    were moved or taken away. `openness`: of furniture that stands open beyond what the house says. `views` are what
+    people in the house see: shares of a picture from their eyes."""
 
     name: str
     house: str
     rooms: tuple[str, ...]
     frames: tuple[WalkFrame, ...]
-    moved: str | None = None
+    moved: tuple[str, ...] = ()
+    openness: Mapping[str, float] = field(default_factory=dict)
     views: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
@@ -107,6 +115,7 @@ def view_of(world: World, person: Placement) -> dict[str, float]:
 def film(world: World, track: Sequence[Camera], folder: Path, first: int = 0) -> Iterator[WalkFrame]:
     """Draw frames of a walk into `folder`, from number `first`: NNN.jpg, and NNN.png with instance ids of 16 bits."""
     things = {p.id: p for p in world.moment.applied(world.house).placements}
+    parts, number = ajar_parts(world), {name: i for i, name in enumerate(world.owners, 1)}
     for k, (position, yaw) in enumerate(track, first):
         view = world.camera(position, yaw, *LENS)
         pictures = {"jpg": view.rgb[..., ::-1], "png": view.ids.astype(np.uint16)}
@@ -114,11 +123,13 @@ def film(world: World, track: Sequence[Camera], folder: Path, first: int = 0) ->
             how = [cv2.IMWRITE_JPEG_QUALITY, 88] if kind == "jpg" else []
             write_bytes(folder / f"{k:03d}.{kind}", cv2.imencode(f".{kind}", picture, how)[1].tobytes())
         shares = shares_of(world, view.ids)
-        cut = {world.owners[i - 1] for side in (0, -1) for i in {*view.ids[side], *view.ids[:, side]} if i}
+        edge = np.unique(np.concatenate([view.ids[[0, -1]].ravel(), view.ids[:, [0, -1]].ravel()]))
+        cut = {world.owners[i - 1] for i in edge.tolist() if 0 < i <= len(things)}
         large = [o for o, share in shares.items() if share >= LARGE or (share >= CLEAR_SHARE and o not in cut)]
         clear = (o for o in large if shares[o] >= WHOLE * outline(things[o], position, yaw))
         x, y, z = (round(float(c), 3) for c in position)
-        yield WalkFrame((x, y, z), round(yaw, 4), shares, tuple(sorted(clear)))
+        ajar = (o for o, c in parts if o in shares and shows(view.ids, number[o], hull(c, position, yaw)))
+        yield WalkFrame((x, y, z), round(yaw, 4), shares, tuple(sorted(clear)), tuple(sorted({*ajar})))
 
 
 def read_frame(path: Path, mode: int = cv2.IMREAD_COLOR) -> np.ndarray:
@@ -141,10 +152,38 @@ def shares_of(world: World, ids: np.ndarray) -> dict[str, float]:
 
 def outline(p: Placement, position: Sequence[float] | np.ndarray, yaw: float) -> float:
     """Share of a frame inside the outline of a thing's box; 0 where it reaches behind the camera."""
-    (pitch, vfov, (height, width)), flat = LENS, rectangle(*p.position[:2], *p.size[:2], p.yaw)
+    flat = rectangle(*p.position[:2], *p.size[:2], p.yaw)
+    corners = np.array([[x, y, p.position[2] + z] for x, y in flat for z in (0.0, p.size[2])])
+    return float(cv2.contourArea(np.clip(hull(corners, position, yaw), -1, 1))) / 4
+
+
+def hull(corners: np.ndarray, position: Sequence[float] | np.ndarray, yaw: float) -> np.ndarray:
+    """(k, 1, 2) float32 outline in a frame, -1 to 1 to the right and upwards, of points (n, 3), metres; a single point
+    where they reach behind the camera."""
+    pitch, vfov, (height, width) = LENS
     camera = camera_at(position, yaw, pitch, vfov)
-    corners = np.array([[x, y, p.position[2] + z] for x, y in flat for z in (0.0, p.size[2])]) - camera.position
-    if (along := corners @ camera.forward).min() < 0.05:
-        return 0.0
+    along = (corners := corners - camera.position) @ camera.forward
     plane = np.stack([corners @ camera.right * height / width, corners @ camera.up]) / along / math.tan(vfov / 2)
-    return float(cv2.contourArea(cv2.convexHull(np.clip(plane.T, -1, 1).astype(np.float32)))) / 4
+    return cv2.convexHull(plane.T.astype(np.float32)) if along.min() > 0.05 else np.zeros((1, 1, 2), np.float32)
+
+
+def ajar_parts(world: World) -> list[tuple[str, np.ndarray]]:
+    """Furniture by id with the (8, 3) corners, metres, of each of its doors and drawers that stands open."""
+    out = []
+    for p in world.moment.applied(world.house).placements:
+        open_by = {name: x for name, x in openness_of(p.params).items() if x > AJAR}
+        whole = apart(world.catalogue.mesh, p) if open_by else None
+        for m in whole.moving if whole else ():
+            if m.name in open_by and m.kind in OPEN_KINDS:
+                turn, shift = m.turn(open_by[m.name])
+                corners = np.array(np.meshgrid(*m.box.T)).reshape(3, -1).T @ turn.T + shift
+                out.append((p.id, RigidPose.upright(p.position, p.yaw).points(corners)))
+    return out
+
+
+def shows(ids: np.ndarray, number: int, outlined: np.ndarray) -> bool:
+    """True if a frame shows most of what is inside an outline (of `hull`), of a thing with this number."""
+    height, width = ids.shape
+    pixels = (outlined[:, 0] * (1, -1) + 1) / 2 * (width, height)
+    inside = cv2.fillConvexPoly(np.zeros(ids.shape, np.uint8), pixels.astype(np.int32), 1) * (ids == number)
+    return bool(inside.sum() > max(CLEAR_SHARE * ids.size, MOSTLY * cv2.contourArea(pixels.astype(np.float32))))
