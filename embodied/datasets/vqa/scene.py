@@ -29,7 +29,8 @@ from embodied.navigation.graph import NavGraph
 from embodied.scene.model import loose, takeable
 
 ASKING: Mapping[str, Any] = read_toml(Path(templates.__file__).with_name("vqa.toml"))
-"""Type to habit to templates; and 'alike', groups of classes that people do not tell apart."""
+"""Type to habit to templates; and 'alike', groups of classes that people do not tell apart, 'unsaid', synonyms that
+mislead, 'parts', classes that may be seen in others."""
 ALIKE: Mapping[str, list[str]] = {name: group for group in ASKING["alike"] for name in group}
 
 
@@ -108,7 +109,10 @@ class WalkScene:
         """A noun for a class, most often its own name, that stands for no other class and fits all such things of the
         house."""
         there = [self.assets[p.id].synonyms for p in self.house.placements if p.object_class == name]
-        fits = lambda noun: all(noun in (*map(str.lower, own), *templates.SPOKEN.things.get(name, ())) for own in there)
+        fits = lambda noun: (
+            noun not in ASKING["unsaid"]
+            and all(noun in (*map(str.lower, own), *templates.SPOKEN.things.get(name, ())) for own in there)
+        )
         alone = [n for n in self.lexicon.nouns_of[name] if self.lexicon.classes_of[n] == (name,) and plural(n) != n]
         nouns = alone if self.rng.random() < 0.4 else []
         return nouns[int(self.rng.integers(len(nouns)))] if (nouns := [*filter(fits, nouns)]) else name
@@ -132,7 +136,8 @@ class WalkScene:
         """'the red armchair', 'the bed in the guest room': words that a reader takes for this thing alone."""
         for adjectives in (int(self.rng.random() < self.by.colours), 1, 2):
             word = self.lexicon.words_for(self.assets[p.id], self.rng, adjectives=adjectives)
-            if self.rng.random() < self.by.plainness or with_article(word.noun).startswith("some "):
+            plain = self.rng.random() < self.by.plainness or word.noun in ASKING["unsaid"]
+            if plain or with_article(word.noun).startswith("some "):
                 word = Word(p.object_class, tuple(w for w in word.adjectives if w not in p.object_class.split()))
             meant = self.meant(str(word))
             if with_article(word.noun).startswith("some "):

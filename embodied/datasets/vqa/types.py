@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 
 from embodied.assets.moving_parts import openness_of
-from embodied.datasets.vqa.scene import ALIKE, WalkScene, bearing, direction, gap, middle
+from embodied.datasets.vqa.scene import ALIKE, ASKING, WalkScene, bearing, direction, gap, middle
 from embodied.datasets.vqa.scoring import VqaQuestion
 from embodied.datasets.vqa.walks import CLEAR_SHARE
 from embodied.geometry import facing_of
@@ -134,7 +134,8 @@ def order(s: WalkScene) -> Asked:
 def visibility(s: WalkScene) -> Asked:
     shown = {i for f in s.walk.frames for i in f.shares} | {*s.glimpsed}
     away = {n: s.noun(n) for n in sorted({*s.elsewhere} - UNFIT)}
-    unseen = [n for n in s.elsewhere if n in away and not shown & {p.id for p in s.called(away[n])}]
+    parts = {part for p in s.house.placements if p.id in s.glimpsed for part in ASKING["parts"].get(p.object_class, ())}
+    unseen = [n for n in s.elsewhere if n in away and n not in parts and not shown & {p.id for p in s.called(away[n])}]
     often = Counter(s.elsewhere)
     for name in s.shuffled(sorted({p.object_class for p in s.things})):
         seen, rarer = [p.id for p in s.things if p.object_class == name], int(s.rng.integers(4))
@@ -154,6 +155,7 @@ def carried(shelf: bool) -> QuestionType:
             classes = {p.object_class for p in s.house.placements if p.parent == carrier.id}
             there = [p for p in small if p.parent == carrier.id and s.carrier_of(p).endswith(" shelf") == shelf]
             alike = {*classes, *(c for name in classes for c in ALIKE.get(name, ()))}
+            alike |= {*ASKING["parts"].get(carrier.object_class, ())}
             beside = {p.object_class for p in small if gap(carrier, p) < NEXT_TO}
             away = {p.object_class for p in small} - alike - beside
             for p in s.shuffled(there) if len(away) > 2 else ():
