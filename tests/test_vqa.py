@@ -18,7 +18,7 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.assets.people.figures import person_of
 from embodied.cli import main
 from embodied.datasets.vqa.build import VqaData, asked_about
-from embodied.datasets.vqa.scene import WalkScene
+from embodied.datasets.vqa.scene import ASKING, WalkScene
 from embodied.datasets.vqa.scoring import (
     BLIND,
     LETTERS,
@@ -31,8 +31,8 @@ from embodied.datasets.vqa.scoring import (
     thinned,
 )
 from embodied.datasets.vqa.types import TYPES
-from embodied.datasets.vqa.walks import CLEAR_SHARE, Walk, WalkFrame
-from embodied.house.house import House, Placement
+from embodied.datasets.vqa.walks import CLEAR_SHARE, Walk, WalkFrame, hull, shows
+from embodied.house.house import House, Placement, Storey
 from embodied.language.lexicon import ROOM_NOUNS
 from embodied.language.plain_language import plural
 from embodied.navigation.graph import build_graph
@@ -110,6 +110,33 @@ def test_a_name_means_one_thing_to_who_reads_it(hand):
     both = scene(second_sofa=True).asked("support", np.random.default_rng(0))
     rooms = {both.name(both.house.placement_by_id[i]).rpartition(" in the ")[2] for i in ("sofa_1", "sofa_2")}
     assert len(rooms) == 2 and rooms <= {*ROOM_NOUNS["living_room"], *ROOM_NOUNS["bedroom"]}
+
+
+def test_rooms_of_one_kind_are_told_apart_by_their_floor():
+    house = two_rooms()
+    below, above = (dataclasses.replace(r, kind="bedroom", storey=k) for k, r in enumerate(house.rooms))
+    house = dataclasses.replace(house, rooms=(below, above), storeys=(*house.storeys, Storey(2.8, 2.5)))
+    s = WalkScene(scene().walk, house, build_graph(two_rooms()), load_catalogue(None))
+    assert {s.room_name(r.id).partition(" on the ")[2] for r in house.rooms} == {"ground floor", "upper floor"}
+
+
+def test_what_is_counted_is_in_a_room_or_in_the_video():
+    counted = [q for q in asked_about(scene(second_sofa=True), 60, seed=0) if q.type == "object_counting"]
+    assert {(q.answer, "video" in q.text) for q in counted} == {("2", True)}  # one sofa in each room
+
+
+def test_words_that_mislead_are_words_of_things():
+    of = scene().lexicon
+    nouns = {n for nouns in of.nouns_of.values() for n in nouns}
+    classes = {*ASKING["parts"], *(c for parts in ASKING["parts"].values() for c in parts)}
+    assert {*ASKING["unsaid"]} <= nouns and classes <= {*of.nouns_of}
+
+
+def test_an_open_door_counts_as_seen_where_most_of_it_is_in_view():
+    corners = np.array([[3, y, z] for y in (-0.3, 0.3) for z in (0.9, 1.5)], float)
+    ids = np.full((360, 480), 7)
+    assert shows(ids, 7, hull(corners, (0, 0, 1.5), 0.0)) and not shows(ids, 8, hull(corners, (0, 0, 1.5), 0.0))
+    assert not shows(ids, 7, hull(corners, (0, 0, 1.5), math.pi)) and not shows(ids, 7, hull(corners, (0, 0, 3.5), 0.0))
 
 
 def test_the_same_seed_asks_the_same(hand):

@@ -1,7 +1,5 @@
 """Building a set of questions: houses are lit and filmed, one at a time; then all walks are asked about and thinned."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math
@@ -30,7 +28,7 @@ from embodied.generate.left_open import free_openness, left_open
 from embodied.generate.people import CLASS, add_people, place_people
 from embodied.house.contents import stocked
 from embodied.house.house import House, Placement
-from embodied.house.moment import Moment, RigidPose
+from embodied.house.moment import Moment, RigidPose, Triple
 from embodied.locks import locked
 from embodied.navigation.connectivity import from_matterport, to_matterport
 from embodied.navigation.graph import NavGraph
@@ -69,7 +67,7 @@ class VqaConfig:
 
 def build_vqa(
     config: VqaConfig, folder: Path, cache: Path, network: Judge, *, workers: int = 1, watch: Watch | None = None
-) -> VqaData:
+) -> "VqaData":
     """Film what is missing, ask, and write vqa.json last; the same command goes on after an interruption.
 
     Raises:
@@ -155,31 +153,30 @@ def two_visits(world: World, node: int, to: Path, name: str, rng: np.random.Gene
     eye, room = world.graph.positions[node], world.graph.room_of_node[node]
     world.show(Moment())
     track = look_around(eye, rng.uniform(-np.pi, np.pi))
-    frames, spots = [*film(world, track, to)], dict[str, np.ndarray]()
+    frames, moved = [*film(world, track, to)], dict[str, RigidPose]()
     small, seen = takeable(world.house, world.catalogue), {i for f in frames for i in f.clear}
     storey = world.house.storey_of(world.house.room_by_id[room])
     for i in rng.permutation(sorted(seen & movable(world.house, world.catalogue))).tolist():
         p = world.house.placement_by_id[i]
-        if p.room == room and p.parent not in spots and len(spots) < CHANGED:
-            away = np.array([*p.position[:2], storey.elevation + storey.height + ABOVE])  # where nobody sees it
-            spot = away if i in small else free_spot(world, p, [eye, *spots.values()], rng)
-            spots |= {} if spot is None else {i: spot}
-    yaw = {i: world.house.placement_by_id[i].yaw for i in spots}
-    world.show(Moment(moved={i: RigidPose.upright((x, y, z), yaw[i]) for i, (x, y, z) in spots.items()}))
-    frames += film(world, track, to, len(frames)) if spots else []
-    return Walk(name, world.name, (room,), tuple(frames), moved=tuple(spots))
+        if p.room == room and p.parent not in moved and len(moved) < CHANGED:
+            away = (*p.position[:2], storey.elevation + storey.height + ABOVE)  # where nobody sees it
+            others = [eye, *(pose.position for pose in moved.values())]
+            if spot := away if i in small else free_spot(world, p, others, rng):
+                moved[i] = RigidPose.upright(spot, p.yaw)
+    world.show(Moment(moved=moved))
+    frames += film(world, track, to, len(frames)) if moved else []
+    return Walk(name, world.name, (room,), tuple(frames), moved=tuple(moved))
 
 
-def free_spot(world: World, p: Placement, others: Sequence[np.ndarray], rng: np.random.Generator) -> np.ndarray | None:
-    """(3,) metres: free floor of its room to which a thing can be moved, MOVED_BY from where it was and from others."""
+def free_spot(world: World, p: Placement, others: Sequence[Any], rng: np.random.Generator) -> Triple | None:
+    """Free floor of its room to which a thing can be moved, metres, MOVED_BY from where it was and from others."""
     floor = world.house.floor(world.house.room_by_id[p.room])
-    for spot in rng.uniform(*np.reshape(floor.bounds, (2, 2)), (100, 2)):
-        around = [
-            (*(spot + max(p.size[:2]) / 2 * np.array([math.cos(a), math.sin(a)])), others[0][2]) for a in range(6)
-        ]
-        far = min(math.dist(spot, at[:2]) for at in (p.position, *others)) > MOVED_BY
-        if far and floor.contains(shapely.Point(spot)) and all(map(world.is_free, around)):
-            return np.array([*spot, p.position[2]])
+    for x, y in rng.uniform(*np.reshape(floor.bounds, (2, 2)), (100, 2)).tolist():
+        reach = max(p.size[:2]) / 2
+        around = [(x + reach * math.cos(a), y + reach * math.sin(a), others[0][2]) for a in range(6)]
+        far = min(math.dist((x, y), at[:2]) for at in (p.position, *others)) > MOVED_BY
+        if far and floor.contains(shapely.Point(x, y)) and all(map(world.is_free, around)):
+            return x, y, p.position[2]
     return None
 
 

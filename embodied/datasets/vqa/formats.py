@@ -1,7 +1,7 @@
 """Questions in the formats of VSI-Bench, LLaVA, SAT and OpenEQA."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -64,17 +64,10 @@ def write_sat(data: VqaData, questions: Questions, out: Path, split: str) -> Non
 
 def write_openeqa(data: VqaData, questions: Questions, out: Path, split: str) -> None:
     """open-eqa-<split>.json of OpenEQA, and frames/<episode history>/NNNNN-rgb.png."""
+    names = ("question", "answer", "category", "question_id", "episode_history")
     text = lambda q: f"{q.text} ({', '.join(q.options)})" if q.options else q.text
-    rows = [
-        {
-            "question": text(q),
-            "answer": q.answer,
-            "category": CATEGORIES.get(q.type, "spatial understanding"),
-            "question_id": q.id,
-            "episode_history": f"embodied/{q.walk}",
-        }
-        for q in questions
-    ]
+    kind = lambda q: CATEGORIES.get(q.type, "spatial understanding")
+    rows = [dict(zip(names, (text(q), q.answer, kind(q), q.id, f"embodied/{q.walk}"))) for q in questions]
     for walk in sorted({q.walk for q in questions}):
         for k, file in enumerate(data.frames(walk)):
             png = cv2.imencode(".png", read_frame(file))[1].tobytes()
@@ -82,11 +75,8 @@ def write_openeqa(data: VqaData, questions: Questions, out: Path, split: str) ->
     write_bytes(out / f"open-eqa-{split}.json", json.dumps(rows, indent=1).encode())
 
 
-FORMATS: dict[str, Callable[[VqaData, Questions, Path, str], None]] = {
-    "vsi": write_vsi,
-    "llava": write_llava,
-    "sat": write_sat,
-    "openeqa": write_openeqa,
+FORMATS: Mapping[str, Callable[[VqaData, Questions, Path, str], None]] = {
+    f.__name__.removeprefix("write_"): f for f in (write_vsi, write_llava, write_sat, write_openeqa)
 }
 
 

@@ -1,7 +1,5 @@
 """A walk as somebody sees it who asks about it: what was seen and when, names that fit one thing only, and words."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -32,8 +30,6 @@ ASKING: Mapping[str, Any] = read_toml(Path(templates.__file__).with_name("vqa.to
 """Type to habit to templates; and 'alike', groups of classes that people do not tell apart, 'unsaid', synonyms that
 mislead, 'parts', classes that may be seen in others."""
 ALIKE: Mapping[str, list[str]] = {name: group for group in ASKING["alike"] for name in group}
-
-
 EASILY_MOVED = ("chair", "stool", "plant", "basket", "box", "bag", "table", "toy", "horse", "suitcase", "stand", " bin")
 LEAST_MOVED = 0.3
 """Parts of the names of classes of what is moved between two visits, and its longest side at least, metres."""
@@ -72,7 +68,7 @@ class WalkScene:
         cameras = (f.position for f in self.walk.frames if p.id in f.clear)
         return any(front @ np.subtract(c[:2], p.position[:2]) > 0.5 * math.dist(c[:2], p.position[:2]) for c in cameras)
 
-    def asked(self, kind: str, rng: np.random.Generator) -> WalkScene:
+    def asked(self, kind: str, rng: np.random.Generator) -> "WalkScene":
         """The scene for somebody drawn who asks questions of a type."""
         scene = copy.copy(self)
         scene.kind, scene.rng, scene.by = kind, rng, templates.draw_speaker(rng)

@@ -4,8 +4,6 @@ Questions that a model answers without sight, having learned from others, are dr
 adversarial filtering (Le Bras et al. 2020, "Adversarial Filters of Dataset Biases", algorithm 1).
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

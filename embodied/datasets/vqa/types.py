@@ -3,8 +3,6 @@ ambiguous, by the margins below. Words are in embodied/language/vqa.toml. Ten ar
 (Yang et al. 2025, "Thinking in Space", sec. 3.2).
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math
@@ -254,8 +252,7 @@ def route(s: WalkScene) -> Asked:
         ]
         turns = [(n, angle) for n, angle in bends if abs(angle) >= STRAIGHT]
         stops = [thing for n in (way[0], *(n for n, _ in turns), way[-1]) for thing in s.named(at[n])[:1]]
-        stairs = len({s.house.room_by_id[room_of[n]].storey for n in way}) > 1
-        if stairs or not 1 <= len(turns) <= 2 or min(abs(angle) for _, angle in turns) < CORNER:
+        if np.ptp(s.graph.positions[way, 2]) or not 1 <= len(turns) <= 2 or min(abs(a) for _, a in turns) < CORNER:
             continue
         at_things = [middle(t) for t, _ in stops]
         seen = [bearing(b, direction(a, b), c) for a, b, c in zip(at_things, at_things[1:], at_things[2:])]

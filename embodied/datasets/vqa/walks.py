@@ -1,7 +1,5 @@
 """Walks through a house for questions about it: where the camera goes, and how much of what each frame shows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -115,7 +113,7 @@ def view_of(world: World, person: Placement) -> dict[str, float]:
 def film(world: World, track: Sequence[Camera], folder: Path, first: int = 0) -> Iterator[WalkFrame]:
     """Draw frames of a walk into `folder`, from number `first`: NNN.jpg, and NNN.png with instance ids of 16 bits."""
     things = {p.id: p for p in world.moment.applied(world.house).placements}
-    parts, number = ajar_parts(world), {name: i for i, name in enumerate(world.owners, 1)}
+    parts, number = [*ajar_parts(world)], {name: i for i, name in enumerate(world.owners, 1)}
     for k, (position, yaw) in enumerate(track, first):
         view = world.camera(position, yaw, *LENS)
         pictures = {"jpg": view.rgb[..., ::-1], "png": view.ids.astype(np.uint16)}
@@ -167,18 +165,15 @@ def hull(corners: np.ndarray, position: Sequence[float] | np.ndarray, yaw: float
     return cv2.convexHull(plane.T.astype(np.float32)) if along.min() > 0.05 else np.zeros((1, 1, 2), np.float32)
 
 
-def ajar_parts(world: World) -> list[tuple[str, np.ndarray]]:
+def ajar_parts(world: World) -> Iterator[tuple[str, np.ndarray]]:
     """Furniture by id with the (8, 3) corners, metres, of each of its doors and drawers that stands open."""
-    out = []
     for p in world.moment.applied(world.house).placements:
-        open_by = {name: x for name, x in openness_of(p.params).items() if x > AJAR}
-        whole = apart(world.catalogue.mesh, p) if open_by else None
+        whole, openness = apart(world.catalogue.mesh, p), openness_of(p.params)
         for m in whole.moving if whole else ():
-            if m.name in open_by and m.kind in OPEN_KINDS:
-                turn, shift = m.turn(open_by[m.name])
+            if m.kind in OPEN_KINDS and openness.get(m.name, 0.0) > AJAR:
+                turn, shift = m.turn(openness[m.name])
                 corners = np.array(np.meshgrid(*m.box.T)).reshape(3, -1).T @ turn.T + shift
-                out.append((p.id, RigidPose.upright(p.position, p.yaw).points(corners)))
-    return out
+                yield p.id, RigidPose.upright(p.position, p.yaw).points(corners)
 
 
 def shows(ids: np.ndarray, number: int, outlined: np.ndarray) -> bool:
