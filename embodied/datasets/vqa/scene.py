@@ -14,7 +14,7 @@ from embodied.assets.people.figures import person_of
 from embodied.datasets.vqa.scoring import VqaQuestion
 from embodied.datasets.vqa.walks import GLIMPSE, OPEN_KINDS, Walk
 from embodied.generate.people import CLASS
-from embodied.geometry import rotation, wrap
+from embodied.geometry import wrap
 from embodied.house.contents import STORED
 from embodied.house.house import House, Placement
 from embodied.house.moment import apart
@@ -56,17 +56,11 @@ class WalkScene:
         self.glimpsed |= {p.id: 0 for p in house.placements if (p.group or "").startswith(STORED)}
         self.movable = movable(house, catalogue)
         self.things = [p for p in house.placements if p.id in self.clear and p.object_class not in UNFIT]
-        fronts = ((p, apart(catalogue.mesh, p)) for p in self.things if self._faced(p))
+        fronts = ((p, apart(catalogue.mesh, p)) for p in self.things)
         self.openable = [p for p, whole in fronts if whole and any(m.kind in OPEN_KINDS for m in whole.moving)]
         kinds = [(r.kind, r.storey) for r in house.rooms]
         self.rooms = {r.id: kind for r, kind in zip(house.rooms, kinds) if kinds.count(kind) == 1}
         self.looked_at = [r for r in dict.fromkeys(walk.rooms) if r in self.rooms]
-
-    def _faced(self, p: Placement) -> bool:
-        """True if a frame that shows a thing clearly was taken from before it."""
-        front = rotation(p.yaw) @ (0.0, -1.0)
-        cameras = (f.position for f in self.walk.frames if p.id in f.clear)
-        return any(front @ np.subtract(c[:2], p.position[:2]) > 0.5 * math.dist(c[:2], p.position[:2]) for c in cameras)
 
     def asked(self, kind: str, rng: np.random.Generator) -> "WalkScene":
         """The scene for somebody drawn who asks questions of a type."""

@@ -169,8 +169,8 @@ def openness(s: WalkScene) -> Asked:
     wide, ajar = {p.id: openness_of(p.params) for p in s.openable}, {i for f in s.walk.frames for i in f.ajar}
     for p, name in s.named(TRIES * [p for p in s.openable if p.id in ajar]):
         wrong = s.named([q for q in s.openable if not wide[q.id]])[:3]
-        if len(wrong) > 1:
-            about = (p.id, *(q.id for q, _ in wrong))
+        if wrong:
+            about = (p.id, *sorted(q.id for q, _ in wrong))
             yield s.ask(name, about, [n for _, n in wrong], f"open by {max(wide[p.id].values()):.2f}")
 
 
@@ -181,7 +181,7 @@ def change(s: WalkScene) -> Asked:
     for p, name in s.named(TRIES * [p for p in s.things if p.id in s.walk.moved]):
         wrong = s.named([q for q in others if q.room == p.room])[:3]
         if len(wrong) > 1:
-            yield s.ask(name, (p.id, *(q.id for q, _ in wrong)), [n for _, n in wrong])
+            yield s.ask(name, (p.id, *sorted(q.id for q, _ in wrong)), [n for _, n in wrong])
 
 
 def whereabouts(s: WalkScene) -> Asked:
@@ -219,8 +219,8 @@ def sun(s: WalkScene) -> Asked:
         faced = [(o.rooms[0], float(-inward(s.house, o) @ flat)) for o in windows]
         return {r: max([SHADY - 1, *(c for room, c in faced if room == r)]) for r in s.looked_at if flat.any()}
 
-    told = sky.weather != "overcast" and max(lit_at(sky.hour).values(), default=0) > SUNNY
-    for hour in s.shuffled([h for h in LATER if abs(h - sky.hour) > 1 and told]):
+    is_told = sky.weather != "overcast" and max(lit_at(sky.hour).values(), default=0) > SUNNY
+    for hour in s.shuffled([h for h in LATER if abs(h - sky.hour) > 1 and is_told]):
         of_room = lit_at(hour)
         shady = [r for r, cosine in of_room.items() if cosine < SHADY]
         for room in [r for r, cosine in of_room.items() if cosine > SUNNY] if shady else ():
