@@ -46,6 +46,7 @@ from embodied.envs.continuous import (
 )
 from embodied.evaluation.tables import Samples, interval
 from embodied.generate import HouseConfig
+from embodied.geometry import wrap
 from embodied.gym.continuous import ContinuousGymEnv, EpisodeDataset, open_episodes
 from embodied.gym.sensors import with_people
 from embodied.records import identity_of
@@ -151,8 +152,9 @@ class Orca:
 class StepsAside:
     """Follows the first of the people at BESIDE metres, out of the way on which they came and go.
 
-    It foresees that who stands goes back, and that who comes back goes on as before; near the person it compares
-    headings and numbers of steps by how near the person will come, and by where it then stands.
+    It foresees that who stands goes back, and that who comes back goes on as before, and goes to the nearest place
+    beside that way. Otherwise it compares headings and numbers of steps by how near the person will come, and by where
+    it then stands.
     """
 
     def __init__(self, env: ContinuousEnv) -> None:
@@ -167,6 +169,11 @@ class StepsAside:
         way, self._clock = self._foreseen(person, pace), clock
         if pace > 0.1:
             self._track = np.vstack([self._track, person])
+        if np.linalg.norm(way - here, axis=1).min() < KEPT and (refuge := self._beside(way, person)) is not None:
+            aside = float(wrap(math.atan2(*(refuge - here)[::-1]) - env.yaw))
+            if abs(aside) < math.radians(env.body.turn) / 2 + 1e-6:
+                return HabitatAction.FORWARD
+            return HabitatAction.LEFT if aside > 0 else HabitatAction.RIGHT
         if math.dist(person, here) > BESIDE + 1.0 or not env.ground.is_free(here, person[None])[0]:
             return far
         number, stride = 360 // env.body.turn, env.body.forward
@@ -191,6 +198,18 @@ class StepsAside:
         if turn:
             return HabitatAction.LEFT if turn > 0 else HabitatAction.RIGHT
         return HabitatAction.FORWARD if count else turned_to_and_fro(env)
+
+    def _beside(self, way: np.ndarray, person: np.ndarray) -> np.ndarray | None:
+        """(2,) where to go next to the nearest place KEPT from a way; None where there is none."""
+        ground, here = self.env.ground, self.env.position
+        near = np.linalg.norm(ground.xy - person, axis=1) < CONTACT + MARGIN
+        ways = ground.wide_ways(np.array([ground.cell_at(here)]), near)
+        free = np.linalg.norm(ground.xy[:, None] - way, axis=2).min(1) > KEPT + MARGIN
+        metres = np.where(free, ways.metres, np.inf)
+        if not np.isfinite(metres.min()):
+            return None
+        path = ground.xy[ways.cells(int(metres.argmin()))[::-1][1 : LOOK_AHEAD + 2]]
+        return path[int(ground.is_free(here, path).nonzero()[0].max(initial=0))]
 
     def _foreseen(self, person: np.ndarray, pace: float) -> np.ndarray:
         """(n, 2) points of the way that the person will go: back where they stand, on where they have been before."""

@@ -386,6 +386,22 @@ def test_whoever_drives_moves_to_a_viewpoint_when_it_is_the_nearest(data):
         set_table(StudyPart("p", assistant="simulated", moves="drive"), data)
 
 
+def test_who_is_steered_walks_where_the_body_is_and_stands_when_it_turns(data):
+    play = Script(data, TOGETHER + 'moves = "drive"\nfigure = "mei"\n', ("ann", "bob"))
+    drive, shown = play.game("ann").drive, []
+    for action in (1, 0, 0, 1):
+        play.play("ann", "moved", candidate=action)
+        _, x, y, z, yaw, figure = drive.eye
+        to = np.array(figure.place.position) - (x, y, z)
+        assert math.dist(figure.place.position[:2], drive.position) < 0.02 and to[2] < -1
+        assert math.hypot(*to[:2]) > 0.5 and math.isclose(math.atan2(to[1], to[0]), yaw, abs_tol=0.05)
+        shown.append(figure.pose)
+    first, *walking, last = shown
+    assert first == last and walking[0] != walking[1] != last
+    with pytest.raises(ValueError, match="mei"):
+        StudyPart("p", figure="nobody", moves="drive")
+
+
 async def fetched(app, path):
     """Status and body of the answer of an ASGI application."""
     sent = []
