@@ -135,7 +135,7 @@ def draw_strolls(
             points = np.round([*line[:-1:4], line[-1]], 3)
             swings = tuple(s for s in walks.swings if s.stop(line) is not None)
             way = tuple((x, y, z) for x, y, z in points.tolist())
-            stroll = Stroll(person, way, *seconds, swings, tuple(walks.climbs))
+            stroll = Stroll(person, way, *seconds, swings=swings, climbs=tuple(walks.climbs))
             walker = Walker(stroll)
             if math.dist(walker.place(0.0)[:3], start) < ABOUT:
                 continue
