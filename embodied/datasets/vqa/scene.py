@@ -84,6 +84,12 @@ class WalkScene:
         shelf = " shelf" if (p.surface or "").startswith("shelf") else ""
         return (self.house.placement_by_id[p.parent].object_class if p.parent else "") + shelf
 
+    def parts(self) -> set[str]:
+        """Classes that may be seen as parts of what the walk shows."""
+        return {
+            c for p in self.house.placements if p.id in self.glimpsed for c in ASKING["parts"].get(p.object_class, ())
+        }
+
     def in_room(self, room: str) -> list[Placement]:
         return [p for p in self.things if p.room == room]
 

@@ -31,6 +31,7 @@ BEHIND, NEXT_TO, HALVED, TRIES = 110.0, 0.5, "curtain", 6
 """Degrees off their way from which people do not see things; metres within which what is not on something might be
 taken to be; a class whose halves people count; times that a thing is asked about with others."""
 SUNNY, SHADY, HIGH, LATER = math.cos(math.radians(50)), math.cos(math.radians(100)), 0.15, (7.0, 9.0, 15.0, 17.0, 19.0)
+COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 """Cosines between where a window looks and the sun, at least of a sunny room and at most of others; the least height of
 the sun, the sine; hours that are asked about."""
 STANDS, CORNER, STRAIGHT, ROUTES = 1.2, 60.0, 25.0, 400
@@ -69,12 +70,12 @@ def sided(s: WalkScene, angle: float, sides: Sides, about: Iterable[str], **slot
 
 def counting(s: WalkScene) -> Asked:
     """In a room, or in the whole video."""
-    rooms = [(p.room, p.object_class) for p in s.things if p.room in s.looked_at]
+    parts, rooms = s.parts(), [(p.room, p.object_class) for p in s.things if p.room in s.looked_at]
     for room, name in s.shuffled([*rooms, *(("", p.object_class) for p in s.things)]):
         noun = s.noun(name)
         there = {p.id: p.object_class for p in s.called(noun) if (p.room == room if room else p.id in s.glimpsed)}
         alone = {*there.values()} == {name} and there.keys() <= s.clear.keys()
-        if 2 <= len(there) <= 12 and plural(noun) != noun and alone and name != HALVED:
+        if 2 <= len(there) <= 12 and plural(noun) != noun and alone and name != HALVED and name not in parts:
             where = s.room_name(room) if room else "video"
             yield s.ask(str(len(there)), (room, *there), things=plural(noun), room=where)
 
@@ -132,8 +133,8 @@ def order(s: WalkScene) -> Asked:
 def visibility(s: WalkScene) -> Asked:
     shown = {i for f in s.walk.frames for i in f.shares} | {*s.glimpsed}
     away = {n: s.noun(n) for n in sorted({*s.elsewhere} - UNFIT)}
-    parts = {part for p in s.house.placements if p.id in s.glimpsed for part in ASKING["parts"].get(p.object_class, ())}
-    unseen = [n for n in s.elsewhere if n in away and n not in parts and not shown & {p.id for p in s.called(away[n])}]
+    known = {*away} - s.parts()
+    unseen = [n for n in s.elsewhere if n in known and not shown & {p.id for p in s.called(away[n])}]
     often = Counter(s.elsewhere)
     for name in s.shuffled(sorted({p.object_class for p in s.things})):
         seen, rarer = [p.id for p in s.things if p.object_class == name], int(s.rng.integers(4))
@@ -209,24 +210,21 @@ def side_of_person(s: WalkScene) -> Asked:
 
 
 def sun(s: WalkScene) -> Asked:
-    """A room into which the sun shines at another hour; into the others it cannot. The video shows where it is now."""
-    sky, windows = s.house.sky, [o for o in s.house.openings if o.rooms[1] is None and o.kind not in HINGED]
-
-    def lit_at(hour: float) -> dict[str, float]:
-        """Rooms to the cosine between the sun and where the window looks that faces it most."""
-        towards = sun_direction(dataclasses.replace(sky, hour=hour))
-        flat = towards[:2] / math.hypot(*towards[:2]) * (towards[2] > HIGH)
-        faced = [(o.rooms[0], float(-inward(s.house, o) @ flat)) for o in windows]
-        return {r: max([SHADY - 1, *(c for room, c in faced if room == r)]) for r in s.looked_at if flat.any()}
-
-    is_told = sky.weather != "overcast" and max(lit_at(sky.hour).values(), default=0) > SUNNY
-    for hour in s.shuffled([h for h in LATER if abs(h - sky.hour) > 1 and is_told]):
-        of_room = lit_at(hour)
-        shady = [r for r, cosine in of_room.items() if cosine < SHADY]
-        for room in [r for r, cosine in of_room.items() if cosine > SUNNY] if shady else ():
-            about, slots = (room, *shady[:3]), {"now": f"{sky.hour:.0f}", "hour": f"{hour:.0f}"}
+    """A room into which the sun shines at an hour; into the others it cannot. Words say which way the video begins."""
+    windows = [o for o in s.house.openings if o.rooms[1] is None and o.kind not in HINGED]
+    looks = COMPASS[round(math.degrees(s.house.sky.north - s.walk.frames[0].yaw) / 45) % 8]
+    for hour in s.shuffled(LATER):
+        towards = sun_direction(dataclasses.replace(s.house.sky, hour=hour))
+        of_room: dict[str, list[float]] = {r: [SHADY - 1] for r in s.looked_at}
+        for o in windows:
+            of_room.get(o.rooms[0], []).append(float(-inward(s.house, o) @ towards[:2] / math.hypot(*towards[:2])))
+        shady = [r for r, cosines in of_room.items() if max(cosines) < SHADY]
+        for room in (
+            [r for r, cosines in of_room.items() if max(cosines) > SUNNY] if shady and towards[2] > HIGH else ()
+        ):
+            about = (room, *shady[:3])
             names = [s.room_name(r) for r in about]
-            yield s.ask(names[0], about, names[1:], f"at {hour:.0f}:00", **slots)
+            yield s.ask(names[0], about, names[1:], f"at {hour:.0f}:00", looks=looks, hour=f"{hour:.0f}")
 
 
 def next_step(s: WalkScene) -> Asked:
