@@ -273,6 +273,15 @@ def test_a_plan_of_ones_own_has_stairs_where_two_storeys_have_the_same_stairwell
     assert len(house.storeys) == 2 and house.stairs[0].rooms == ("stairwell_1", "stairwell_2")
     build_graph(house)
     plan = json.loads(OWN)
+    plan["rooms"][5]["attic"] = True
+    file.write_text(json.dumps(plan))
+    (low,) = (r for r in house_of_plan(load_plan(file), seed=3).rooms if r.slopes)
+    assert low.kind == "main_bedroom" and [k for k, _ in low.slopes] == [1]
+    plan["rooms"][3]["attic"] = True
+    file.write_text(json.dumps(plan))
+    with pytest.raises(HouseError, match="1 can have a slope"):
+        load_plan(file)
+    plan = json.loads(OWN)
     plan["rooms"][3]["polygon"] = [[0, 4], [2.4, 4], [2.4, 8.2], [0, 8.2]]
     file.write_text(json.dumps(plan))
     with pytest.raises(HouseError, match="needs one room of kind 'stairwell'"):

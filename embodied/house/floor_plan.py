@@ -20,7 +20,7 @@ from embodied.assets.cache import write_bytes
 from embodied.assets.json_file import from_plain, read_toml
 from embodied.geometry import rectangle, rotation
 from embodied.house.house import House, Opening, Placement, Room, Stair
-from embodied.house.shapes import footprint, inward
+from embodied.house.shapes import HEADROOM, footprint, inward, roof_hole, under_slopes
 
 Colour = tuple[int, int, int]
 Point = Sequence[float] | np.ndarray
@@ -75,6 +75,9 @@ def paint_plan(
             sheet.hatch(room)
     _draw_furniture(sheet, house, ids)
     sheet.shape(walls_of(house, rooms), INK)
+    for room in rooms:
+        for strip in under_slopes(room, HEADROOM):  # from here on one stoops
+            sheet.clipped(strip.exterior.coords, house.floor(room), SOFT)
     for o in house.openings:
         if o.rooms[0] in ids:
             _draw_opening(sheet, house, o)
@@ -178,11 +181,11 @@ class _Sheet:
         pale, inside = _darker(ROOM_COLOURS.get(room.kind, PAPER), 9), shapely.Polygon(room.polygon)
         x0, y0, x1, y1 = inside.bounds
         for k in range(1, math.ceil((x1 - x0) / 0.4)):
-            self._clipped(((x0 + 0.4 * k, y0), (x0 + 0.4 * k, y1)), inside, pale)
+            self.clipped(((x0 + 0.4 * k, y0), (x0 + 0.4 * k, y1)), inside, pale)
         for k in range(1, math.ceil((y1 - y0) / 0.4)):
-            self._clipped(((x0, y0 + 0.4 * k), (x1, y0 + 0.4 * k)), inside, pale)
+            self.clipped(((x0, y0 + 0.4 * k), (x1, y0 + 0.4 * k)), inside, pale)
 
-    def _clipped(self, line: Sequence[Point], inside: shapely.Polygon, colour: Colour) -> None:
+    def clipped(self, line: Sequence[Point], inside: shapely.Polygon, colour: Colour) -> None:
         cut = inside.intersection(shapely.LineString(line))
         for g in getattr(cut, "geoms", [cut]):
             if g.geom_type == "LineString" and not g.is_empty:
@@ -202,6 +205,12 @@ def _draw_opening(sheet: _Sheet, house: House, o: Opening) -> None:
     high = house.inner_wall / 2  # from here on, along n, the first room begins, and before `low` the other
     low = -(high if o.rooms[1] is not None else house.outer_wall - high)
     rooms = [house.room_by_id[r] for r in o.rooms if r is not None]
+    if o.kind == "roof_window":
+        ring = np.asarray(roof_hole(rooms[0], o).exterior.coords)
+        sheet.polygon(ring, PAPER)
+        for line in (ring, ring[[0, 2]], ring[[1, 3]]):
+            sheet.line(line, 0.03, (96, 140, 168))
+        return
     colour = ROOM_COLOURS.get(rooms[0].kind, PAPER)
     hole = [a + low * n, b + low * n, b + high * n, a + high * n]
     sheet.polygon(hole, fill=PAPER if o.kind in ("window", "french_window") else colour)

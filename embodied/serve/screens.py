@@ -184,7 +184,7 @@ def plan_of(place: Place, pictures: EncodedPanoramas) -> Screen:
     """A house as a plan: rooms and viewpoints, metres."""
     house, graph = place.house, place.graph
     floor = {r.id: r.storey for r in house.rooms}
-    inner = [o for o in house.openings if o.kind != "window"]
+    inner = [o for o in house.openings if o.kind not in ("window", "roof_window")]
     plain = lambda points: np.round(points, 2).tolist()
     room = lambda r: {"kind": r.kind.replace("_", " "), "outline": plain(r.polygon), "floor": floor[r.id]}
     doors = [{"line": plain([o.a, o.b]), "floor": floor[o.rooms[0]]} for o in inner]
