@@ -191,11 +191,12 @@ class World:
                     self.add(name, parts)
             rest = mujoco.MjData(model)
             mujoco.mj_forward(model, rest)
-            self._followed, self._resting = model, (openness(model, rest), body_poses(model, rest, things))
-        free = {model.body(b).name for b in model.jnt_bodyid[model.jnt_type == 0]} & {*things}
-        poses, (shut, rests) = body_poses(model, data, (*self._bodies, *free)), self._resting
+            free = sorted({model.body(b).name for b in model.jnt_bodyid[model.jnt_type == 0]} & {*things})
+            self._followed, self._resting = model, (openness(model, rest), body_poses(model, rest, things), free)
+        shut, rests, free = self._resting
+        poses = body_poses(model, data, (*self._bodies, *free))
         bodies = {name: pose for name, pose in poses.items() if name in self._bodies}
-        moved = {i: poses[i] for i in sorted(free) if poses[i].apart(before.moved.get(i, rests[i])) > SETTLED}
+        moved = {i: poses[i] for i in free if poses[i].apart(before.moved.get(i, rests[i])) > SETTLED}
         ways = openness(model, data)
         opened = {i: x for i, x in ways.items() if abs(x - before.openness.get(i, shut[i])) > SETTLED}
         now = {"moved": {**before.moved, **moved}, "openness": {**before.openness, **opened}, "bodies": bodies}

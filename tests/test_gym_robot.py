@@ -27,6 +27,7 @@ from embodied.agents.language_models.client import AnswerCache, Client, ServerSe
 from embodied.gym.bring import BringEnv
 from embodied.gym.robot import RobotEnv, RobotSettings, make
 from embodied.interface import Ask, Intention, Move
+from embodied.render.photograph import PhotoCamera, lens_map
 from embodied.world import open_world
 
 pytestmark = pytest.mark.gl
@@ -64,6 +65,31 @@ def test_gymnasium_accepts_the_environment_and_its_cameras_see(world):
     assert len(env.body.feels) == len(seen["proprio"]) and len(env.commands) == env.action_space.shape[0]
 
 
+def test_a_devices_lens_bends_all_that_a_robots_camera_sees(world):
+    seen = {}
+    for camera in ("ideal", "robot"):
+        settings = RobotSettings(size=(32, 32), observations=("rgb", "depth", "ids"), camera=camera, device=3)
+        env = RobotEnv({world.name: world}, settings)
+        seen[camera] = env.reset(seed=1)[0]
+        assert all(np.array_equal(a, seen[camera][k]) for k, a in env.reset(seed=1)[0].items()), "noise is of the seed"
+    x, y = lens_map(PhotoCamera("robot", 3).traits.radial, math.radians(70), 32, 32)
+    at = np.round(y).astype(int), np.round(x).astype(int)
+    for k in ("head_depth", "head_ids"):
+        assert (seen["robot"][k] == seen["ideal"][k][at]).mean() > 0.97 and (seen["robot"][k] != seen["ideal"][k]).any()
+
+
+def test_observations_have_the_names_that_robosuites_users_know(world):
+    settings = RobotSettings(size=(32, 32), cameras=("head", "hand"), observations=("rgb", "ids"), names="robosuite")
+    env = RobotEnv({world.name: world}, settings)
+    o, _ = env.reset(seed=1)
+    assert env.observation_space.contains(o)
+    assert {"agentview_image", "agentview_segmentation_instance", "robot0_eye_in_hand_image"} < set(o)
+    assert np.allclose(o["robot0_eef_pos"], env.body.hand) and o["robot0_gripper_qpos"].shape == (2,)
+    assert len(o["robot0_joint_pos"]) == 7, "head, lift and telescope"
+    _, _, z, w = o["robot0_eef_quat"]
+    assert math.isclose(2 * math.atan2(z, w) % math.tau, env.body.yaw % math.tau, abs_tol=0.02)
+
+
 def test_velocities_are_those_of_the_base(world):
     env = RobotEnv({world.name: world}, RobotSettings(**SMALL))
     env.reset(seed=1)
@@ -93,6 +119,19 @@ def test_a_closed_hand_holds_a_thing_where_grasps_are_assisted_alone(world, gras
     if ended:
         body.step(1.0)
         assert body.held is None and body.thing("mug_1")[2] < mug[2] + 0.02, "let go, it falls"
+
+
+@pytest.mark.parametrize("breaks", [0.5, 1e4])
+def test_what_is_pushed_harder_than_it_stands_counts_as_broken(world, breaks):
+    env = RobotEnv({world.name: world}, RobotSettings(**SMALL, breaks=breaks))
+    env.reset(seed=1)
+    mug = env.body.thing("mug_1")
+    env.body.stand(mug[:2] + (0, 0.45), -math.pi / 2)
+    env.body.data.qpos[env.body.model.joint("robot/lift").qposadr[0]] = mug[2]
+    arm = (np.array([mug[2], 0, 0, 0, 0]) - env.middle) / env.half
+    for _ in range(10):
+        *_, info = env.step(np.array([0.5, 0, 0, *arm, 0]))
+    assert info["broken"] == (("mug_1",) if breaks < 1 else ())
 
 
 @pytest.fixture(scope="module")

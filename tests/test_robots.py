@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from types import SimpleNamespace
+
 import mujoco
 import numpy as np
 import pytest
@@ -109,6 +112,24 @@ def test_a_jaco_of_dm_control_rides_on_our_wheels(house_spec):
         0.1 < np.linalg.norm(data.body("robot/chassis").xpos - before) < 1.0
         and data.body("robot/chassis").xmat[8] > 0.9
     )
+
+
+def test_a_name_is_of_menagerie_which_is_asked_for_the_robot_without_its_scene(house_spec, monkeypatch):
+    entry = lambda name, is_mjx=False: SimpleNamespace(name=name, is_mjx=is_mjx)
+
+    def spec(name):
+        assert name == "cube"
+        (robot := mujoco.MjSpec()).worldbody.add_body(name="it").add_geom(size=[0.1, 0, 0])
+        return robot
+
+    entries = entry("scene"), entry("cube_mjx", True), entry("cube")
+    known = SimpleNamespace(entry_points=entries, spec=spec)
+    stand_in = SimpleNamespace(get={"cube": known}.__getitem__)
+    monkeypatch.setitem(sys.modules, "mujoco_menagerie", stand_in)
+    assert place(house_spec, "cube").name == "robot" and house_spec.compile().body("robot/it").mass[0] > 0
+    monkeypatch.setitem(sys.modules, "mujoco_menagerie", None)
+    with pytest.raises(ValueError, match=r"pip install 'embodied-houses\[robots\]'"):
+        place(house_spec, "cube", name="other")
 
 
 def test_a_robot_without_room_or_name_is_refused(house_spec):

@@ -1,5 +1,5 @@
 """Benchmarks of houses, pictures, light and play, and of what agents see: steps with pixels, live pictures, the body on
-wheels, and views of a panorama.
+wheels, a robot with arms, and views of a panorama.
 
 With OMP_NUM_THREADS=1 rates are of one core; threads that draw together take more processor time in all.
 """
@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+import mujoco
 import numpy as np
 
 from embodied.assets.catalogue import Catalogue
@@ -25,6 +26,7 @@ from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
 from embodied.gym.driving import DriveSettings, Driving, expert_action
 from embodied.gym.env import HelpGymEnv
+from embodied.gym.robot import RobotEnv, RobotSettings
 from embodied.gym.sensors import CameraSensor, PanoramaStore, Sensor, ViewSettings
 from embodied.gym.spaces import SpaceLayout
 from embodied.house.house import House
@@ -277,6 +279,47 @@ def _film(renderer: Renderer, cameras: Sequence[Camera], size: tuple[int, int], 
             renderer.through(camera, size)
         else:
             renderer.rgb(camera, size)
+
+
+ARM = 10
+"""Joints of each of the robot's two arms."""
+
+
+def robots(catalogue: Catalogue, cache: Path, seed: int, pictures: str) -> Iterator[Measure]:
+    """Steps of Robot-v0, a tenth of a second each, of a robot that drives and waves two arms before its eyes."""
+    with one_core(), open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, pictures=pictures) as world:
+        rate = functools.partial(measure, unit="1/s", per=DRIVE_STEPS, clock=time.process_time)
+        for seen in ((), *(channels for _, channels, _ in LINES[:2])):
+            settings = RobotSettings(two_arms(), f"link_1_{ARM - 1}", "pick", observations=seen)
+            env = RobotEnv({world.name: world}, settings)
+            env.reset(seed=seed)
+            name = f"robot of {2 * ARM} joints, {' and '.join(seen) or 'without pictures'}, 128 x 128"
+            yield rate(name, functools.partial(_wave, env))
+
+
+def two_arms() -> mujoco.MjSpec:
+    """A cart with a mast, a camera and two arms of ARM hinges, all driven."""
+    spec, kinds = mujoco.MjSpec(), mujoco.mjtGeom
+    cart = spec.worldbody.add_body(name="cart")
+    cart.add_geom(type=kinds.mjGEOM_BOX, size=[0.2, 0.18, 0.15], pos=[0, 0, 0.18], mass=40)
+    cart.add_geom(type=kinds.mjGEOM_CYLINDER, size=[0.05, 0.35, 0], pos=[0, 0, 0.65], mass=5)
+    cart.add_camera(name="head", pos=[0.1, 0, 1.25], xyaxes=[0, -1, 0, 0.3, 0, 1], fovy=70)
+    for side in (-1, 1):
+        link = cart
+        for k in range(ARM):
+            name, at = f"link_{side}_{k}", [0.06, 0, 0] if k else [0.1, 0.2 * side, 0.95]
+            link = link.add_body(name=name, pos=at, gravcomp=1)
+            link.add_joint(name=name, axis=[0, k % 2, 1 - k % 2], damping=2, armature=0.05)
+            link.add_geom(type=kinds.mjGEOM_CAPSULE, fromto=[0, 0, 0, 0.06, 0, 0], size=[0.03, 0, 0], mass=0.2)
+            spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT).set_to_position(kp=20)
+    return spec
+
+
+def _wave(env: RobotEnv) -> None:
+    """DRIVE_STEPS actions."""
+    for k in range(DRIVE_STEPS):
+        waves = 0.2 * np.sin(k / 8 + np.arange(len(env.commands)))
+        env.step(np.clip([0.7 * math.sin(k / 20), 0.0, 0.4 * math.cos(k / 15), *waves[3:]], -1, 1))
 
 
 SKYBOX_SIDE = 512

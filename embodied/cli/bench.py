@@ -2,7 +2,7 @@
 
   houses, pictures, plays   generation, rendering, environment steps with help
   views, seen               views of a panorama, steps with pixels
-  drive                     live pictures, and the steps of a body on wheels that sees them
+  drive, robots             live pictures, and the steps of a body on wheels, and of a robot, that see them
   bakes                     light a flat repeatedly
   light                     compare the ways of rendering with a path tracer
   moving                    compare what moves with a path tracer, and what a frame costs then; takes an hour, in pieces
@@ -22,7 +22,7 @@ from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.options import Option, OutputFolder, drawn_as
 from embodied.render.pictures import DRAWN
 
-PARTS = ("houses", "pictures", "views", "plays", "seen", "drive", "bakes", "light", "moving", "people")
+PARTS = ("houses", "pictures", "views", "plays", "seen", "drive", "robots", "bakes", "light", "moving", "people")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class BenchOptions(Furnished, Printed):
     seed: int = 7
     """Seed of the houses."""
     pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
-    """How pictures, seen and drive draw the house."""
+    """How pictures, seen, drive and robots draw the house."""
     out: OutputFolder = Path("out/bench")
     """Folder for the files of light, moving and people."""
 
@@ -52,6 +52,7 @@ def run(args: BenchOptions) -> None:
         "plays": lambda: world.plays(catalogue, args.seed),
         "seen": lambda: world.seen(catalogue, args.cache, args.seed, args.pictures),
         "drive": lambda: world.drive(catalogue, args.cache, args.seed, args.pictures),
+        "robots": lambda: world.robots(catalogue, args.cache, args.seed, args.pictures),
         "bakes": lambda: world.bakes(catalogue, args.cache, args.seed),
     }
     measures = []

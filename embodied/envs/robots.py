@@ -38,12 +38,17 @@ class RobotBody:
             known = sorted(n.removeprefix(start) for n in {*bodies, *sites} if n.startswith(start))
             raise ValueError(f"the robot has no site or body {hand!r} for a hand; it has {known}")
         self._hand = self.data.site(start + hand).xpos if start + hand in sites else self.data.body(start + hand).xpos
+        wrist = m.site_bodyid[sites[start + hand]] if start + hand in sites else bodies[start + hand]
         rolls = f"{start}rolling" in bodies
         self._base = [m.joint(start + k).qposadr[0] for k in ROLLING] if rolls else []
         self._wheels = [m.actuator(start + k).id for k in ROLLING] if rolls else []
         self.arm = [a for a in range(m.nu) if m.actuator(a).name.startswith(start) and a not in self._wheels]
         own = [j for j in range(m.njnt) if m.joint(j).name.startswith(start) and m.jnt_qposadr[j] not in self._base]
         self._joints = [j for j in own if m.jnt_type[j] in UNITS]
+        under = {int(wrist)}  # bodies that hang on it
+        for b in range(wrist + 1, m.nbody):
+            under |= {b} if m.body_parentid[b] in under else set()
+        self._wrist, self._fingers = int(wrist), np.isin(m.jnt_bodyid[self._joints], sorted(under - {wrist}))
         words = [f"{m.joint(j).name} {UNITS[m.jnt_type[j]]}" for j in self._joints]
         self.feels = (*words, *(f"{x}/s" for x in words), "ahead m/s", "left m/s", "turn rad/s", "holds")
         """Names and units of `proprioception`."""
@@ -59,8 +64,8 @@ class RobotBody:
         """Everything at rest, and the robot at its start."""
         self._let_go()
         mujoco.mj_resetDataKeyframe(self.model, self.data, self.model.key(f"{self.placed.name}/start").id)
-        self.metres, self.force, self.met, self.rolling = 0.0, 0.0, frozenset[str](), np.zeros(3)
-        """Metres of its way; the largest force, N, and owners of what it touched in the last step; and velocities of a
+        self.metres, self.met, self.rolling = 0.0, dict[str, float](), np.zeros(3)
+        """Metres of its way; the largest force, N, by owner of what it touched in the last step; and velocities of a
         rolling base, ahead, to the left and around, metres and radians per second."""
         mujoco.mj_forward(self.model, self.data)
 
@@ -87,7 +92,7 @@ class RobotBody:
 
     def step(self, seconds: float, *, holding: bool = False) -> None:
         """Let time pass while `rolling` and the controls are held; `holding` is whether an assisted hand is closed."""
-        met, before, force, self.force = set[str](), self.position, np.zeros(6), 0.0
+        before, force, self.met = self.position, np.zeros(6), {}
         for _ in range(max(1, round(seconds / PERIOD))):
             if self._wheels:
                 self.data.ctrl[self._wheels] = *(rotation(self.yaw) @ self.rolling[:2]), self.rolling[2]
@@ -96,9 +101,8 @@ class RobotBody:
                 self._hold() if holding else self._let_go()
             for k, owner in touches(self.model, self.data, self._is_own):
                 mujoco.mj_contactForce(self.model, self.data, k, force)
-                self.force = max(self.force, float(force[0]))
-                met.add(owner)
-        self.metres, self.met = self.metres + float(np.linalg.norm(self.position - before)), frozenset(met)
+                self.met[owner] = max(self.met.get(owner, 0.0), float(force[0]))
+        self.metres += float(np.linalg.norm(self.position - before))
 
     def proprioception(self) -> np.ndarray:
         """(len(feels),) float32: joints, their speeds, motion of the base, and 1 where a hand holds something."""
@@ -106,6 +110,14 @@ class RobotBody:
         mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_XBODY, self.root, v, 0)
         motion = *(rotation(-self.yaw) @ v[3:5]), v[2], float(self.held is not None)
         return np.concatenate([self.data.qpos[adr], self.data.qvel[dof], motion]).astype(np.float32)
+
+    def robosuite(self) -> dict[str, np.ndarray]:
+        """float32, by robosuite's names: joints of the arm and of the gripper, and the hand in the world, x y z w."""
+        q, v = self.data.qpos[self.model.jnt_qposadr[self._joints]], self.data.qvel[self.model.jnt_dofadr[self._joints]]
+        arm, hand = ~self._fingers, np.roll(self.data.xquat[self._wrist], -1)
+        values = {"joint_pos": q[arm], "joint_vel": v[arm], "gripper_qpos": q[~arm], "gripper_qvel": v[~arm]}
+        values |= {"eef_pos": self._hand, "eef_quat": hand, "base_pos": self.data.xpos[self.root]}
+        return {f"robot0_{name}": value.astype(np.float32) for name, value in values.items()}
 
     def thing(self, name: str) -> np.ndarray:
         """(3,) centre of mass of a thing, metres, world."""

@@ -22,11 +22,12 @@ from embodied.envs.robots import FETCHER, RobotBody
 from embodied.gym.drive import chosen_worlds
 from embodied.gym.driving import POINTS, TEXT
 from embodied.gym.env import VIEW, LiveEnv
-from embodied.gym.sensors import LARGE, PIXELS, check_live, live_pixels, pixel_spaces
+from embodied.gym.sensors import LARGE, PIXELS, check_live, live_pixels, photographed, pixel_spaces
 from embodied.gym.spaces import codes_of
 from embodied.kinds.plugins import Registry
 from embodied.navigation.floor_ways import FloorWays
 from embodied.render.camera import camera_of
+from embodied.render.photograph import check_camera
 from embodied.scene.doors import openness
 from embodied.scene.robots import place
 from embodied.seeds import checked_seed
@@ -38,6 +39,8 @@ CONTROL, FASTEST_BASE = 0.1, (0.6, 0.6, 1.5)
 NEAR, RAISED, FALLS, HIGHEST, OPENED, SHUT = 1.0, 0.05, 0.2, 1.4, 0.5, 0.1
 """Metres at which a thing is found, by which it is picked up, by which something fell, and above the floor at most of
 what is wanted; openness from which something is open, and below which it is shut."""
+
+ROBOSUITE_PIXELS = dict(zip(PIXELS, ("image", "depth", "segmentation_instance"), strict=True))
 
 
 @dataclass(frozen=True)
@@ -58,13 +61,21 @@ class RobotSettings:
     """Cameras of the robot's file, and some of embodied.gym.sensors.PIXELS of each; nothing for a blind robot."""
     size: tuple[int, int] = (128, 128)
     """Height and width, pixels."""
+    names: str = "embodied"
+    """'robosuite': robot0_joint_pos, robot0_eef_pos, agentview_image, ... instead of proprio and head_rgb."""
+    camera: str = "ideal"
+    device: int = 0
+    """The kind of camera and which device of that kind, as of ViewSettings: lens, exposure and noise."""
+    breaks: float = 100.0
+    """Newtons with which the robot touches a thing that counts as broken from then on: info["broken"]."""
     seconds: float = 180.0
     """After which an episode is cut short, in the simulated world."""
 
     def __post_init__(self) -> None:
         check_live(self.observations, PIXELS, *self.size)
+        check_camera(self.camera)
         robot_task(self.task)
-        known = {"actions": ("base", "actuators"), "grasp": ("contact", "assisted")}
+        known = {"actions": ("base", "actuators"), "grasp": ("contact", "assisted"), "names": ("embodied", "robosuite")}
         for name, values in known.items():
             if getattr(self, name) not in values:
                 raise ValueError(f"{name} is {getattr(self, name)!r}; use one of {values}")
@@ -105,7 +116,7 @@ class RobotEnv(LiveEnv):
     """Errands of a robot as a Gymnasium environment.
 
     Reward: 1 on success, minus 0.001 an action. info: success, is_success, spl, metres, seconds, contacts (owners
-    touched), force (the largest, N), fallen (things), openness, grasp, held.
+    touched), force (the largest, N), fallen and broken (things), openness, grasp, held.
     """
 
     spoken: tuple[str, ...] = ()
@@ -129,8 +140,8 @@ class RobotEnv(LiveEnv):
         self.commands = (*rolling, *arm, *hand, *self.spoken)  # an action's numbers
         self.action_space = spaces.Box(-1.0, 1.0, (len(self.commands),), np.float32)
         pixels = pixel_spaces(settings.size, settings.observations)
-        seen: dict[str, spaces.Box] = {f"{c}_{name}": space for c in settings.cameras for name, space in pixels.items()}
-        seen["proprio"] = spaces.Box(-LARGE, LARGE, (len(body.feels),), np.float32)
+        seen = {self._picture_name(c, name): space for c in settings.cameras for name, space in pixels.items()}
+        seen |= {name: spaces.Box(-LARGE, LARGE, value.shape, np.float32) for name, value in self._feels().items()}
         self.observation_space = spaces.Dict({**seen, "instruction": spaces.Box(0, 255, (self.text,), np.uint8)})
 
     def _enter(self, name: str) -> None:
@@ -157,7 +168,7 @@ class RobotEnv(LiveEnv):
         start = self._begin(rng)
         self.body.stand(self.ground.xy[start], float(rng.uniform(-math.pi, math.pi)))
         self.body.step(0.4)
-        self.body.metres, self._fallen = 0.0, set[str]()
+        self.body.metres, self._fallen, self._broken = 0.0, set[str](), set[str]()
         self.heights = {i: float(self.body.thing(i)[2]) for i in self.body.things}
         self._lowest = np.array([*self.heights.values()]) - FALLS
         return self._look(), {"world": name, "request": self.goal.request, **self._facts()}
@@ -186,6 +197,7 @@ class RobotEnv(LiveEnv):
         self.time += CONTROL
         low = body.data.xipos[[*body.things.values()], 2] < self._lowest
         self._fallen |= {i for i, down in zip(body.things, low) if down and i != body.held}
+        self._broken |= {i for i, force in body.met.items() if i in body.things and force > self.settings.breaks}
         self.succeeded = self.task.succeeded(self)
         late = self.time >= self.settings.seconds - 1e-9 and not self.succeeded
         self.ended = self.succeeded or late
@@ -203,8 +215,9 @@ class RobotEnv(LiveEnv):
             "metres": body.metres,
             "seconds": self.time,
         }
-        facts |= {"spl": success * self.shortest / max(body.metres, self.shortest), "force": body.force}
-        facts |= {"contacts": tuple(sorted(body.met)), "fallen": tuple(sorted(self._fallen)), "held": body.held or ""}
+        facts |= {"spl": success * self.shortest / max(body.metres, self.shortest), "held": body.held or ""}
+        facts |= {"contacts": tuple(sorted(body.met)), "force": max(body.met.values(), default=0.0)}
+        facts |= {"fallen": tuple(sorted(self._fallen)), "broken": tuple(sorted(self._broken))}
         return {**facts, "grasp": self.settings.grasp, "openness": self.openness}
 
     @property
@@ -218,8 +231,20 @@ class RobotEnv(LiveEnv):
             self.world.follow(self.body.model, self.body.data, slack=3 * SLACK)
         for name in s.cameras if s.observations else ():
             camera = camera_of(self.body.model, self.body.data, f"robot/{name}")
-            seen |= {f"{name}_{k}": v for k, v in live_pixels(self.world, camera, s.size, s.observations).items()}
-        return {**seen, "proprio": self.body.proprioception(), "instruction": codes_of(self.heard, self.text).copy()}
+            pixels = live_pixels(self.world, camera, s.size, s.observations)
+            place = name, *(round(1000 * x) for x in (self.time, *camera.position))
+            pixels = photographed(self.world, camera, pixels, s.camera, s.device, self.world.name, *place)
+            seen |= {self._picture_name(name, k): v for k, v in pixels.items()}
+        return {**seen, **self._feels(), "instruction": codes_of(self.heard, self.text).copy()}
+
+    def _feels(self) -> dict[str, np.ndarray]:
+        return self.body.robosuite() if self.settings.names == "robosuite" else {"proprio": self.body.proprioception()}
+
+    def _picture_name(self, camera: str, channel: str) -> str:
+        if self.settings.names != "robosuite":
+            return f"{camera}_{channel}"
+        others = {"hand": "robot0_eye_in_hand", self.settings.cameras[0]: "agentview"}
+        return f"{others.get(camera, camera)}_{ROBOSUITE_PIXELS[channel]}"
 
     @property
     def heard(self) -> str:

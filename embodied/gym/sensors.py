@@ -93,6 +93,19 @@ def live_pixels(
     return {name: np.ascontiguousarray(whole[name]) for name in observations}
 
 
+def photographed(world: World, camera: Camera, pixels: Arrays, name: str, device: int, *place: str | int) -> Arrays:
+    """Live pictures of a camera as a device takes them: the lens bends all, the rest is the colours'.
+
+    Args:
+      name, device: as of ViewSettings.
+      place: what tells these pictures from others, for the noise.
+    """
+    photo, vfov = _camera(name, device), camera.vfov
+    light = world.darkness(camera.position) if "rgb" in pixels and photo.traits is not None else 1.0
+    taken = lambda k, a: photo.photographed(a, vfov, *place, light=light) if k == "rgb" else photo.bent(a, vfov)
+    return {k: taken(k, a) for k, a in pixels.items()}
+
+
 def among(world: World, crowd: Crowd, ways: Mapping[str, float]) -> World:
     """The world with doors open as far as `ways` and people have them, to a tenth where it is unlit; where it is lit,
     people are drawn where they are now."""

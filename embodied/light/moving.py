@@ -89,6 +89,8 @@ class MovingHouse:
         self._skins: dict[str, Skin] = {}
         self._bent: dict[str, list[np.ndarray]] = {}
         self._lit_bent: dict[str, np.ndarray] = {}
+        poses = lambda o: {name: RigidPose.upright(p.position, p.yaw) for name, p in self._leaf_parts(o)}
+        self._leaf_poses = functools.lru_cache(maxsize=64)(poses)
         self.contents: dict[str, str] = {}
         """Classes of what lies in furniture that was opened, by id."""
 
@@ -105,8 +107,7 @@ class MovingHouse:
         out = dict(moment.moved)
         for o in self.house.openings:
             if o.id in moment.openness:
-                turned_ = dataclasses.replace(o, angle=moment.openness[o.id] * WIDEST)
-                out |= {name: RigidPose.upright(p.position, p.yaw) for name, p in self._leaf_parts(turned_)}
+                out |= self._leaf_poses(dataclasses.replace(o, angle=moment.openness[o.id] * WIDEST))
         for thing, openness in moment.open_parts(self.house).items():
             placement = self.house.placement_by_id[thing]
             if moment.carrier(self.house, placement) is not None:

@@ -154,8 +154,8 @@ class Renderer:
           patches: page, row, column and (h, w, 3) uint8 of each part.
         """
         drawing = self._open()
-        for number, vertices in corners.items():
-            drawing.move(self._numbers[number], vertices)  # type: ignore[union-attr]
+        if corners:
+            drawing.move({self._numbers[number]: v for number, v in corners.items()})  # type: ignore[union-attr]
         for page, row, column, picture in patches:
             drawing.repaint(page, (row, column), picture)  # type: ignore[union-attr]
         if self._overlay is not None:

@@ -79,7 +79,9 @@ class Raster:
             meshes, ids, pages, place_of, copied, frozenset(moving)
         )
         ends = np.cumsum([0, *(len(m.vertices) for m in meshes)])
-        self._moving = {i: (int(ends[i]), corners[ends[i] : ends[i + 1]].copy()) for i in moving}
+        self._moving = {i: (int(ends[i]), int(ends[i + 1])) for i in moving}
+        self._first_moving = min((at for at, _ in self._moving.values()), default=0)
+        self._corners = corners[self._first_moving : max((at for _, at in self._moving.values()), default=0)].copy()
         _upload_corners(self._array, self._buffers, corners)
         self._triangles = triangles.astype(np.uint32)
         self._through, self._canvas = (int(t) for t in GL.glGenTextures(2))
@@ -133,16 +135,20 @@ class Raster:
         self._end()
         return picture, _metres(near), ids
 
-    def move(self, mesh: int, vertices: np.ndarray) -> None:
-        """Put the vertices (n, 3) float32 of a moving mesh elsewhere, metres."""
-        first, corners = self._moving[mesh]
-        corners["xyz"] = np.tile(vertices, (len(corners) // len(vertices), 1))  # a hollow thing has two sides
+    def move(self, meshes: Mapping[int, np.ndarray]) -> None:
+        """Put the vertices (n, 3) float32 of moving meshes elsewhere, metres."""
+        for mesh, vertices in meshes.items():
+            begin, end = (at - self._first_moving for at in self._moving[mesh])
+            sides = (end - begin) // len(vertices)  # a hollow thing has two
+            self._corners["xyz"][begin:end] = vertices if sides == 1 else np.tile(vertices, (sides, 1))
+            columns = np.ascontiguousarray(vertices.T)
+            low, high = columns.min(1), columns.max(1)
+            self.middles[mesh], self.reaches[mesh] = (low + high) / 2, (high - low) / 2
+        first, last = min(self._moving[i][0] for i in meshes), max(self._moving[i][1] for i in meshes)
+        part = self._corners[first - self._first_moving : last - self._first_moving]
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._buffers[0])
-        GL.glBufferSubData(GL.GL_ARRAY_BUFFER, first * CORNER.itemsize, corners.nbytes, corners.view(np.uint8))
+        GL.glBufferSubData(GL.GL_ARRAY_BUFFER, first * CORNER.itemsize, part.nbytes, part.view(np.uint8))
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, 0)
-        columns = np.ascontiguousarray(vertices.T)
-        low, high = columns.min(1), columns.max(1)
-        self.middles[mesh], self.reaches[mesh] = (low + high) / 2, (high - low) / 2
 
     def repaint(self, page: int, at: tuple[int, int], part: np.ndarray) -> None:
         """Show `part` (h, w, 3) uint8 from row and column `at` of a page on."""

@@ -1,5 +1,6 @@
 """Bodies of any MuJoCo model as parts: robots and things that users add, to be drawn in the light of a house."""
 
+import functools
 from collections.abc import Collection
 from pathlib import Path
 
@@ -54,11 +55,15 @@ def body_name(model: mujoco.MjModel, body: int) -> str:
 
 def body_poses(model: mujoco.MjModel, data: mujoco.MjData, names: Collection[str]) -> dict[str, RigidPose]:
     """Poses of bodies as they are now."""
-    wanted, poses = set(names), {}
-    for body in range(1, model.nbody):
-        if (name := body_name(model, body)) in wanted:
-            poses[name] = RigidPose(tuple(data.xpos[body].tolist()), tuple(data.xquat[body].tolist()))
-    return poses
+    bodies, xyz, quat = _bodies(model), data.xpos.tolist(), data.xquat.tolist()
+    some = [(name, bodies[name]) for name in names if name in bodies]
+    return {name: RigidPose(tuple(xyz[body]), tuple(quat[body])) for name, body in some}
+
+
+@functools.lru_cache(maxsize=4)
+def _bodies(model: mujoco.MjModel) -> dict[str, int]:
+    """Numbers of bodies by name."""
+    return {body_name(model, body): body for body in range(1, model.nbody)}
 
 
 def geom_color(model: mujoco.MjModel, geom: int) -> np.ndarray:
