@@ -1,12 +1,10 @@
-"""Doors, drawers and lids of furniture, and curtains: found in its mesh by one rule, with the inside that they close.
+"""Doors, drawers and lids of furniture, curtains and blinds: found in its mesh by one rule, with what they close.
 
 A front is a separate piece of the mesh, or several that belong together, which nothing covers and which carries one or
 two handles. With its handle near one side it is a door, hung at the other; with its handle in the middle a drawer, or,
 of ovens, a flap hung at its lower edge. Round doors and lids need no handle. What the front closes is cut open and
 lined, with shelves in it; a drawer takes its box along.
 """
-
-from __future__ import annotations
 
 import dataclasses
 import functools
@@ -29,9 +27,9 @@ OPEN = "open/"
 OPENING_ROWS = read_json(DATA / "opening.json")
 OPENING_CLASSES = frozenset(OPENING_ROWS)
 """Classes in whose models moving parts are looked for. A row may have a "kind": "flap" (doors hang at their lower edge
-where the handle is in the middle), "round", "lid" or "curtain"; "only_doors" where what looks like a drawer is fixed;
-a "basin" that reaches so many metres below the upper edge of a front; the "skin" of its inside; and the classes of what
-it "holds", in "drawers" where these hold something else (embodied.house.contents)."""
+where the handle is in the middle), "round", "lid", "curtain", "blind"; "only_doors" where what looks like a drawer is
+fixed; a "basin" that reaches so many metres below the upper edge of a front; the "skin" of its inside; and the classes
+of what it "holds", in "drawers" where these hold something else (embodied.house.contents)."""
 FULL_TURN = {"door": math.pi / 2, "flap": 1.45, "lid": 1.5}
 """Radians at openness 1; a drawer comes out by PULL of its depth."""
 PULL = 0.75
@@ -58,9 +56,10 @@ class MovingPart:
     """A door, drawer or lid, in the frame of its thing."""
 
     name: str
-    """'door', 'left_door', 'door_2', 'drawer', 'drawer_1' (from below), 'lid', 'left_half'; unique in its thing."""
+    """'door', 'left_door', 'door_2', 'drawer', 'drawer_1' (from below), 'lid', 'left_half', 'cloth'; unique."""
     kind: str
-    """'door', 'flap', 'drawer', 'lid' or 'curtain': half of a pair, which slides from the side to the middle."""
+    """'door', 'flap', 'drawer', 'lid', 'blind', which rises to its roll, or 'curtain': half of a pair, which slides
+    from the side to the middle."""
     axis: np.ndarray
     """(3,) unit: the way in which it slides, or what it turns about, right-handed."""
     origin: np.ndarray
@@ -83,7 +82,12 @@ class MovingPart:
     @property
     def slides(self) -> bool:
         """True for what does not turn."""
-        return self.kind in ("drawer", "curtain")
+        return self.kind in ("drawer", "curtain", "blind")
+
+    @property
+    def top(self) -> float:
+        """z above which nothing of it is: a blind is rolled up there."""
+        return float(self.box[1, 2]) if self.kind == "blind" else math.inf
 
     def turn(self, openness: float) -> tuple[np.ndarray, np.ndarray]:
         """(3, 3) rotation and (3,) metres that bring it from closed to open: rotation @ point + metres."""
@@ -123,7 +127,7 @@ class TakenApart:
         middles = np.concatenate([p.vertices[p.faces].mean(1) for p, _ in groups])
         for k, m in enumerate(self.moving):
             turn, shift = m.turn(openness.get(m.name, 0.0))
-            middles[label == k] = middles[label == k] @ turn.T + shift
+            middles[label == k] = np.minimum(middles[label == k] @ turn.T + shift, [np.inf, np.inf, m.top])
         nearest: np.ndarray = label[cKDTree(middles).query(points)[1]]
         return nearest
 
@@ -138,7 +142,7 @@ def taken_apart(object_class: str, parts: tuple[MeshPart, ...]) -> TakenApart | 
     if (row := OPENING_ROWS.get(object_class)) is None:
         return None
     s = _Pieces.of(parts)
-    special = {"lid": _lids, "curtain": _curtains}.get(row.get("kind"))
+    special = {"lid": _lids, "curtain": _curtains, "blind": _blinds}.get(row.get("kind"))
     moving = _named(special(s) if special else _fronts(s, row))
     if not moving:
         return None
@@ -149,10 +153,7 @@ def taken_apart(object_class: str, parts: tuple[MeshPart, ...]) -> TakenApart | 
     label[np.any(held, axis=0)] = WITHIN
     labels = tuple(label[of] for of in s.of_face)
     holes = tuple(_hole(m, row.get("kind") == "round") for m in moving if m.cut)
-    fixed = []
-    for p in _where(parts, labels, FIXED):
-        rows, faces, _ = cut_open(holes, np.concatenate([p.vertices, p.normals, p.uv], axis=1), p.faces)
-        fixed.append(MeshPart(rows[:, :3], faces, rows[:, 3:6], rows[:, 6:], p.finish))
+    fixed = [part_without(p, holes) for p in _where(parts, labels, FIXED)]
     finish = max(fixed, key=lambda p: float(np.ptp(p.vertices, axis=0).prod())).finish
     within, meshes = list(_where(parts, labels, WITHIN)), {}
     for k, (m, holds) in enumerate(zip(moving, held, strict=True)):
@@ -181,7 +182,8 @@ def opened(object_class: str, parts: tuple[MeshPart, ...], openness: Mapping[str
     for m in thing.moving:
         turn, shift = (a.astype(np.float32) for a in m.turn(openness.get(m.name, 0.0)))
         for p in thing.parts[m.name]:
-            out.append(dataclasses.replace(p, vertices=p.vertices @ turn.T + shift, normals=p.normals @ turn.T))
+            there = np.minimum(p.vertices @ turn.T + shift, np.array([np.inf, np.inf, m.top], np.float32))
+            out.append(dataclasses.replace(p, vertices=there, normals=p.normals @ turn.T))
     return tuple(out)
 
 
@@ -222,7 +224,7 @@ class _Pieces:
     """(m,) piece of each face, by mesh."""
 
     @staticmethod
-    def of(parts: Sequence[MeshPart]) -> _Pieces:
+    def of(parts: Sequence[MeshPart]) -> "_Pieces":
         of_face, first = [], 0
         for p in parts:
             _, welded = np.unique(np.round(p.vertices / 1e-4).astype(np.int64), axis=0, return_inverse=True)
@@ -373,11 +375,24 @@ def _curtains(s: _Pieces) -> list[MovingPart]:
     return halves
 
 
+def _blinds(s: _Pieces) -> list[MovingPart]:
+    """The cloth of a blind with the bar at its foot, which rises to its roll; none where they are not told apart."""
+    size, low, high = s.high - s.low, s.low.min(0), s.high.max(0)
+    foot = s.low[:, 2] < low[2] + 1e-4
+    cloth = ~foot & (size > 0.7 * (high - low))[:, XZ].all(1)
+    if not cloth.any():
+        return []
+    box, bar = (np.array([s.low[some].min(0), s.high[some].max(0)]) for some in (cloth, foot))
+    reach = float(2 * box[1, 2] - high[2] - bar[1, 2])  # the cloth ends at the axis of its roll
+    pieces, up = np.flatnonzero(cloth | foot), np.array([0, 0, 1.0])
+    return [MovingPart("cloth", "blind", up, box.mean(0), reach, box, bar, box[[1, 1]], pieces, False)]
+
+
 def _named(parts: Sequence[MovingPart]) -> list[MovingPart]:
     """The parts in order, with names: what is alone has no number, two doors beside each other are left and right."""
     out = []
-    words = (("door", ("door", "flap")), ("drawer", ("drawer",)), ("lid", ("lid",)), ("half", ("curtain",)))
-    for word, kinds in words:
+    words = {"door": ["door", "flap"], "drawer": ["drawer"], "lid": ["lid"], "half": ["curtain"], "cloth": ["blind"]}
+    for word, kinds in words.items():
         some = sorted((p for p in parts if p.kind in kinds), key=lambda p: (round(p.box[0, 2], 2), p.box[0, 0]))
         names = [word] if len(some) == 1 else [f"{word}_{k + 1}" for k in range(len(some))]
         if len(some) == 2 and word in ("door", "half") and some[0].box[1, 0] < some[1].box[0, 0] + 0.01:
@@ -425,6 +440,12 @@ def cut_open(
         faces = np.concatenate([faces[outside], own]).astype(np.int32)
         source = np.concatenate([source[outside], source[np.array(cut, int)]])
     return rows, faces, source
+
+
+def part_without(p: MeshPart, holes: Sequence[Corners]) -> MeshPart:
+    """A mesh with holes cut into it."""
+    rows, faces, _ = cut_open(holes, np.concatenate([p.vertices, p.normals, p.uv], axis=1), p.faces)
+    return MeshPart(rows[:, :3], faces, rows[:, 3:6], rows[:, 6:], p.finish)
 
 
 def _halves(polygon: np.ndarray, way: np.ndarray, far: float) -> Corners:

@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 from conftest import two_rooms
 from hand_light import TINY
+from hand_sweeps import sweeps
 from handmade import smooth_pages
-from test_scene import Unpainted
 
 from embodied.assets.catalogue import load_catalogue
-from embodied.assets.moving_parts import OPENING_CLASSES, taken_apart
+from embodied.assets.moving_parts import OPENING_CLASSES, opened, taken_apart
 from embodied.assets.records import bounds
 from embodied.evaluation.evaluate import play
-from embodied.generate import generate_house
-from embodied.generate.left_open import free_openness, left_open
+from embodied.generate import HouseConfig, generate_house
 from embodied.house.contents import contents, part_of
 from embodied.house.house import House, HouseError, Placement
+from embodied.house.left_open import free_openness, left_open
 from embodied.house.moment import Moment, apart
 from embodied.house.shapes import inward
 from embodied.house.validation import check_known
@@ -37,7 +37,7 @@ from embodied.records import from_json, to_json
 from embodied.scene.doors import openness
 from embodied.scene.export import export_mjcf
 from embodied.scene.joinery import opening_parts
-from embodied.scene.model import build_spec, loose, takeable
+from embodied.scene.model import build_spec, takeable
 from embodied.world import World
 
 CATALOGUE = load_catalogue()
@@ -95,7 +95,7 @@ def test_every_built_asset_with_handles_opens_and_no_piece_of_it_is_lost():
         whole, seen = bounds(parts), bounds((*thing.fixed, *(p for some in thing.parts.values() for p in some)))
         np.testing.assert_allclose(seen, whole, atol=0.002, err_msg=key)
         for m in thing.moving:
-            opens = m.kind == "curtain" or (m.cut and (m.inside[1] > m.inside[0]).all())
+            opens = m.kind in ("curtain", "blind") or (m.cut and (m.inside[1] > m.inside[0]).all())
             assert thing.fixed and opens, key
 
 
@@ -302,45 +302,37 @@ def test_what_is_left_open_follows_from_the_seed_and_meets_nothing():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2))
-def test_nearly_all_of_a_house_opens_by_seventy_degrees_and_loose_things_rest_for_ten_seconds(seed, shared_cache):
+@pytest.mark.parametrize("seed", (0, 1, 18))
+def test_all_that_must_open_opens_by_seventy_degrees_and_loose_things_rest_for_ten_seconds(seed, shared_cache):
+    """All but furniture in which nothing lies; in seed 18 a back door once met an open leaf."""
     catalogue = load_catalogue(shared_cache)
-    house = generate_house(seed, catalogue=catalogue)
-    free, carry = takeable(house, catalogue), {p.parent for p in house.placements if "chair" not in (p.parent or "")}
-    blinds = {p.id for p in house.placements if p.object_class == "window blind"}  # windows behind them stay shut
-    aside = (loose(house, catalogue) - carry) | blinds
-    rest = build_spec(house, Unpainted(catalogue), hinged=True, free=free).compile()
-    data = mujoco.MjData(rest)
-    mujoco.mj_forward(rest, data)
-    start, shut = data.xpos.copy(), openness(rest, data)
-    for _ in range(2500):
-        mujoco.mj_step(rest, data)
-    astray = np.linalg.norm(data.xpos - start, axis=1) > 0.02
-    assert astray.sum() <= 1 and (data.tree_asleep >= 0).all()
-    assert openness(rest, data) == pytest.approx(shut, abs=1e-3)
-    model = build_spec(house, Unpainted(catalogue), hinged=True).compile()
-    data, widths = mujoco.MjData(model), {}
-    for j in range(model.njnt):
-        if "_handle" not in model.joint(j).name:
-            reach = model.jnt_user[j, 0] or math.pi / 2
-            met = (far for far in np.linspace(0, 1, 10)[1:] if _meets(model, data, j, far * reach, aside))
-            widths[model.joint(j).name] = next(met, 1.0)
-    narrow = {name: far for name, far in widths.items() if far < 70 / 90}
-    assert len(narrow) <= 0.06 * len(widths), narrow
-    assert not any(re.match("door_", name) for name in narrow), narrow  # nobody is locked in
+    found = sweeps(generate_house(seed, HouseConfig(storeys=1), catalogue=catalogue), catalogue)
+    assert {kind for kind, *_ in found.narrow.values()} <= {"furniture"}, found.narrow
+    assert len(found.narrow) <= 0.06 * found.joints.total() and found.joints["window"] > 9
+    assert not found.astray and not found.awake and not found.crept
 
 
-def _meets(model, data, joint: int, value: float, aside: frozenset[str]) -> bool:
-    """True where what turns about a joint is in what nobody moves aside."""
-    mujoco.mj_resetData(model, data)
-    data.qpos[model.jnt_qposadr[joint]] = value
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_collision(model, data)
-    turns = {int(model.jnt_bodyid[joint])}
-    turns |= {b for b in range(model.nbody) if int(model.body_parentid[b]) in turns}
-    for contact in data.contact[: data.ncon]:
-        sides = [int(model.geom_bodyid[g]) in turns for g in contact.geom]
-        other = model.geom(contact.geom[sides.index(False)]).name if sides[0] != sides[1] else ""
-        if other and contact.dist < -0.002 and re.split("[#/]", other)[0] not in aside:
-            return True
-    return False
+def test_a_window_opens_only_when_the_blind_before_it_is_up_and_the_blind_ends_at_its_roll():
+    o = next(o for o in HOUSE.openings if o.kind == "window")
+    asset, n, drop = CATALOGUE.assets["built/roller_blind_blue"], inward(HOUSE, o), 0.9 * (o.head - o.sill)
+    x, y = np.mean([o.a, o.b], axis=0) + n * (HOUSE.inner_wall / 2 + asset.size[1] / 2 + 0.001)
+    size = (math.dist(o.a, o.b) + 0.06, asset.size[1], drop)
+    at, yaw = (float(x), float(y), o.head + 0.04 - drop), math.atan2(n[1], n[0]) + math.pi / 2
+    blind = Placement("window_blind_1", asset.key, asset.object_class, o.rooms[0], at, yaw, size)
+    house = dataclasses.replace(HOUSE, placements=(blind,))
+    for far in (0.0, 0.5, 1.0):
+        shown = bounds(CATALOGUE.mesh(blind.asset, size, (("open/cloth", far),) if far else ()))
+        thing = apart(CATALOGUE.mesh, blind)
+        cloth = bounds(opened("window blind", thing.closed, {"cloth": far})[-2:])
+        assert shown[1, 2] == pytest.approx(drop, abs=1e-3) and cloth[1, 2] < drop
+        assert cloth[0, 2] == pytest.approx(far * thing.moving[0].reach, abs=1e-3)
+    model = build_spec(house, CATALOGUE, hinged=True).compile()
+    data = mujoco.MjData(model)
+    window, cloth = (f"{o.id}_hinge", o.id), ("window_blind_1_slidejoint", "window_blind_1/cloth")
+    pulls = ((*window, 30, 0, 0.3), (*window, -30, 0, 0.01), (*cloth, 20, 0.99, 1), (*window, 30, 0.9, 1))
+    for joint, part, force, low, high in pulls:
+        for _ in range(1500):
+            data.qfrc_applied[model.joint(joint).dofadr[0]] = force
+            mujoco.mj_step(model, data)
+        data.qfrc_applied[:] = 0
+        assert low - 0.01 <= openness(model, data)[part] <= high + 0.01, joint

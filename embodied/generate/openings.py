@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import shapely
 
 from embodied.generate.access import MOVING, Link, Pair, SharedWall, beside_floor, outer_stretches, walls_between
 from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.layout import FloorPlan
 from embodied.generate.modules import Cell
+from embodied.geometry import rotation
 from embodied.house.house import Opening, rounded
 
 Point = tuple[float, float]
@@ -403,13 +405,25 @@ def _french_window(made: _Openings, i: int, rng: np.random.Generator) -> None:
 
 
 def _back_door(made: _Openings, i: int, rng: np.random.Generator) -> bool:
-    """True if there was an outer wall for it."""
+    """True if there was an outer wall for it. It is hung elsewhere where it would meet a leaf that stands open."""
     fits = [w for w in made.outside[i] if w.length > 2.4]
     if fits:
-        w = fits[-1]
-        start = w.low + 0.3 if rng.random() < 0.5 else w.high - 1.2
-        made.add_outer(w, "back_door", start, 0.9, hinge=str(rng.choice(["a", "b"])))
+        places = [(w, start) for w in reversed(fits) for start in (w.low + 0.3, w.high - 1.2)]
+        place = places[rng.random() >= 0.5]
+        drawn = (*place, str(rng.choice(["a", "b"])))
+        every = (drawn, *((*place, hinge) for place in places for hinge in "ab"))
+        w, start, hinge = next((x for x in every if not _meets_open_leaf(made, *x)), drawn)
+        made.add_outer(w, "back_door", start, 0.9, hinge=hinge)
     return bool(fits)
+
+
+def _meets_open_leaf(made: _Openings, w: OuterWall, start: float, hinge: str) -> bool:
+    """True if a back door would meet a leaf that stands open, or its handle."""
+    post = _jambs(made.plan.cells[w.cell], w.axis, w.across, start, start + 0.9)["ab".index(hinge)]
+    swept = shapely.Point(post).buffer(0.9) & shapely.box(*_swing(w.axis, w.across, start, start + 0.9, -w.side))
+    sides = ((o, 1 if o.hinge == "a" else -1) for o in made.found if o.angle)
+    leaves = ((*np.array((o.a, o.b)[::side]), side * o.angle) for o, side in sides)
+    return any(swept.intersects(shapely.LineString([p, p + rotation(t) @ (q - p)]).buffer(0.07)) for p, q, t in leaves)
 
 
 def _windows(made: _Openings, i: int, height: float, rng: np.random.Generator) -> None:

@@ -3,28 +3,25 @@
 They are no part of a house's JSON; `stocked` adds those that lie in what is open, as placements of their own.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from embodied.assets.catalogue import Asset, Catalogue
 from embodied.assets.moving_parts import OPENING_ROWS, MovingPart, openness_of
 from embodied.house.house import House, Placement
 from embodied.house.household import household_of
+from embodied.house.left_open import free_openness
 from embodied.house.moment import RigidPose, apart
 from embodied.seeds import stream
 
-if TYPE_CHECKING:
-    from embodied.assets.catalogue import Asset, Catalogue
-
 STORED = "in/"
 """Start of Placement.group of what lies in furniture; the name of its part follows."""
-AROUND_THINGS, SMALLEST, EMPTY_SHARE = 0.02, 0.6, 0.2
-"""Metres around things, the least share of its size that one is folded to, and how likely a row ends early."""
+AROUND_THINGS, SMALLEST, EMPTY_SHARE, REACHED = 0.02, 0.6, 0.2, 0.85
+"""Metres around things, the least share of its size that one is folded to, how likely a row ends early, and how far a
+part can open at least in which something lies, by boxes around what stands near."""
 
 
 def part_of(thing: str) -> str:
@@ -40,18 +37,20 @@ def kept_in(object_class: str, part: str) -> list[str]:
 
 def contents(house: House, catalogue: Catalogue, *, hidden: bool = False) -> tuple[Placement, ...]:
     """Things in the open parts of furniture, where they lie now; an id begins with those of furniture and part:
-    'dresser_1.drawer_2.towel_1'.
+    'dresser_1.drawer_2.towel_1'. Nothing lies where a part cannot be opened.
 
     Args:
       hidden: also what lies in closed ones.
     """
     household, out = household_of(house), list[Placement]()
+    is_open = hidden or any(openness_of(p.params) for p in house.placements)
+    free = free_openness(house, catalogue, cleared=True) if is_open else {}
     has = {"", *household.habits, *(["children"] if household.children else [])}
     for p in house.placements:
         openness = openness_of(p.params)
         whole = apart(catalogue.mesh, p) if hidden or openness else None
         for m in whole.moving if whole is not None else ():
-            if hidden or m.name in openness:
+            if (hidden or m.name in openness) and free[f"{p.id}/{m.name}"] > REACHED:
                 words = (word.partition(":") for word in kept_in(p.object_class, m.name))
                 classes = [some for w, _, habit in words if habit in has and (some := catalogue.of_class(w))]
                 way = m.turn(openness.get(m.name, 0.0))[1] if m.slides else np.zeros(3)

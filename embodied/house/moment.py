@@ -34,6 +34,8 @@ class RigidPose:
     """Metres."""
     quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     """w x y z, unit."""
+    top: float = math.inf
+    """Height above which nothing of it is, metres: a blind is rolled up there."""
 
     @staticmethod
     def upright(position: Triple, yaw: float) -> RigidPose:
@@ -63,15 +65,16 @@ class RigidPose:
         angle = 2 * math.acos(min(cos, 1.0)) if cos < 1 - 1e-12 else 0.0
         return max(math.dist(self.position, other.position), angle / 3)
 
-    def then(self, turn: np.ndarray, shift: np.ndarray) -> RigidPose:
+    def then(self, turn: np.ndarray, shift: np.ndarray, top: float = math.inf) -> RigidPose:
         """The pose of a part of the thing that is turned, (3, 3), and shifted, (3,) metres, in the thing's frame."""
         x, y, z, w = Rotation.from_matrix(self.rotation @ turn).as_quat().tolist()
         a, b, c = (self.rotation @ shift + self.position).tolist()
-        return RigidPose((a, b, c), (w, x, y, z))
+        return RigidPose((a, b, c), (w, x, y, z), self.position[2] + top)
 
     def points(self, local: np.ndarray) -> np.ndarray:
         """(n, 3) world metres of points (n, 3) of the thing's frame."""
-        return local @ self.rotation.T.astype(local.dtype) + np.asarray(self.position, local.dtype)
+        out = local @ self.rotation.T.astype(local.dtype) + np.asarray(self.position, local.dtype)
+        return out if self.top == math.inf else np.minimum(out, np.array([np.inf, np.inf, self.top], local.dtype))
 
     def local(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) of the thing's frame, of points (n, 3) of the world."""

@@ -117,7 +117,7 @@ class MovingHouse:
             out[thing + INSIDE_NAME] = rest
             for m in whole.moving:
                 if m.name in openness:
-                    out[f"{thing}/{m.name}"] = rest.then(*m.turn(openness[m.name]))
+                    out[f"{thing}/{m.name}"] = rest.then(*m.turn(openness[m.name]), m.top)
         return out | dict(moment.bodies) | {name: figure.place for name, figure in moment.people.items()}
 
     def _apart(self, thing: str) -> TakenApart | None:
@@ -226,16 +226,16 @@ class MovingHouse:
         parts = [Part(p.id, "object", p.room, m, k) for m, k in zip(meshes, keys, strict=True)]
         rest = RigidPose.upright(p.position, p.yaw)
         drawers = {f"{STORED}{m.name}": m.name for m in whole.moving if m.slides}
-        closed_ = dataclasses.replace(p, params=closed(p.params))
-        inside = contents(dataclasses.replace(self.house, placements=(closed_,)), self.catalogue, hidden=True)
-        lying = tuple(c for c in inside if drawers.get(c.group or "", "") == name)
+        shut = tuple(dataclasses.replace(q, params=closed(q.params)) for q in self.house.placements)
+        inside = contents(dataclasses.replace(self.house, placements=shut), self.catalogue, hidden=True)
+        lying = tuple(c for c in inside if c.parent == thing and drawers.get(c.group or "", "") == name)
         self.contents |= {c.id: c.object_class for c in lying}
         some = dataclasses.replace(self.house, placements=lying)
         parts += [_in_frame(x, rest) for x in object_parts(some, self.catalogue)]
         surface = self._surface(parts)
         for m in whole.moving:
             if m.name == name:
-                rest = rest.then(*m.turn(openness_of(p.params).get(name, 0.0)))
+                rest = rest.then(*m.turn(openness_of(p.params).get(name, 0.0)), m.top)
         return _Thing(surface, rest, frozenset())
 
     @property

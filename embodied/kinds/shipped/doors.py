@@ -27,13 +27,8 @@ def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.Par
 
 def opened(episode: Episode, graph: NavGraph) -> float:
     """Doors that the agent opened, how ever."""
-    return float(
-        sum(
-            len(m)
-            for (_, m), s in zip(doors_in(episode, graph), episode.steps)
-            if m and not isinstance(s.action, Close)
-        )
-    )
+    moved = zip(doors_in(episode, graph), episode.steps)
+    return float(sum(len(doors) for (_, doors), s in moved if not isinstance(s.action, Close)))
 
 
 def needed(episode: Episode, graph: NavGraph) -> float:
@@ -53,11 +48,7 @@ DOORS_KIND = task_kind.register_kind(
         name="doors",
         title="Doors",
         tasks=tasks,
-        baselines={
-            **task_kind.PLAIN_AGENTS,
-            "never opens": NeverOpens,
-            "wanderer, blind": functools.partial(Wanderer, None),
-        },
+        baselines={**task_kind.PLAIN_AGENTS, "never opens": NeverOpens, "wanderer, blind": lambda: Wanderer(None)},
         looking={"wanderer": Wanderer, "wanderer, never opens": functools.partial(Wanderer, opens=False)},
         needs_stop=True,
         metrics={

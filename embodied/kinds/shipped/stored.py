@@ -1,10 +1,8 @@
 """Stored: find a thing of a class that lies in furniture, which has to be opened (docs/doors.md)."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
@@ -14,14 +12,11 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.envs.base import HelpEnv
 from embodied.geometry import wrap
 from embodied.house.contents import contents, part_of
+from embodied.house.house import Placement
 from embodied.kinds import task_kind
-from embodied.navigation.graph import OPENING
+from embodied.navigation.graph import OPENING, NavGraph
 from embodied.policies.doors import Fetch, Searcher
 from embodied.tasks.goals import FindConfig, GoalClass, build_pool, find_task, footprint_distance
-
-if TYPE_CHECKING:
-    from embodied.house.house import Placement
-    from embodied.navigation.graph import NavGraph
 
 CONFIG = FindConfig(kind="stored", fewest_nodes=2, horizon=60)
 SEEN = 4
@@ -51,9 +46,8 @@ class ReachingMoves(PanoramicMoves):
             for part in middles:
                 p = place.house.placement_by_id[part.partition("/")[0]]
                 before = (eyes[:, :2] - p.position[:2]) @ [np.sin(p.yaw), -np.cos(p.yaw)] > p.size[1] / 2
-                metres = np.where(
-                    before & (np.array(place.graph.room_of_node) == p.room), footprint_distance(p, eyes), 9
-                )
+                before &= np.array(place.graph.room_of_node) == p.room
+                metres = np.where(before, footprint_distance(p, eyes), 9)
                 for k in np.flatnonzero(metres <= WITHIN_REACH):
                     near[k].append((float(metres[k]), part))
             self._parts[name] = [{n: middles[n] for _, n in sorted(some)[:MOST_PARTS]} for some in near]
@@ -67,10 +61,8 @@ class ReachingMoves(PanoramicMoves):
         columns = (wrap(yaw - pose.yaw), slope, views, np.zeros(len(parts), bool))
         before = (moves.bearing, moves.slope, moves.view, moves.allowed)
         b, s, v, can = (np.concatenate([a, b]).astype(a.dtype) for a, b in zip(before, columns, strict=True))
-        return interface.Candidates(b, s, v, can), (
-            *poses,
-            *(interface.Pose(pose.node, int(v) % interface.TURNS, int(v) // interface.TURNS - 1) for v in views),
-        )
+        looks = (interface.Pose(pose.node, int(v) % interface.TURNS, int(v) // interface.TURNS - 1) for v in views)
+        return interface.Candidates(b, s, v, can), (*poses, *looks)
 
 
 class StoredEnv(HelpEnv):

@@ -1,38 +1,48 @@
 """How far doors, drawers and lids can open in a house, and which of them its household has left open."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
-from embodied.assets.moving_parts import MovingPart
+from embodied.assets.catalogue import Catalogue
+from embodied.assets.moving_parts import OPENING_CLASSES, MovingPart
 from embodied.geometry import rotation
 from embodied.house.house import WINDOWS, House, Opening, Placement
 from embodied.house.moment import WIDEST, Moment, apart
 from embodied.house.shapes import footprint, inward
 from embodied.seeds import stream
 
-if TYPE_CHECKING:
-    from embodied.assets.catalogue import Catalogue
-
 OPENNESS_STEPS = np.linspace(0, 1, 19)[1:]
 """Openness that is tried; of doors, every 5 degrees."""
 NEAR = 0.02
 """Metres that things may stand in the way: boxes around them are larger than they are."""
+CLOTH, PUSHED, ROLL = ("curtain", "sheer curtain"), 0.6, 0.08
+"""Classes that are drawn aside, longest side on the floor of what is pushed, height of a raised blind, metres."""
 LEFT = {"door": (0.1, 0.05, 0.5), "drawer": (0.12, 0.1, 0.6), "lid": (0.8, 1.0, 1.0)}
 """Share of the parts of furniture that a household leaves open at disorder 1, and how far, from and to."""
 BATHS, BATH_DOORS = ("bathroom", "toilet"), (0.6, 0.1, 0.4)
 """Kinds of room whose doors stand ajar, and likewise how many of them, and how far."""
 
 
-def free_openness(house: House, catalogue: Catalogue) -> dict[str, float]:
+def gives_way(p: Placement, catalogue: Catalogue) -> bool:
+    """True for what somebody who opens a thing moves first: cloth, seats, tables, bins and lamps, what lies about."""
+    stands = catalogue.assets[p.asset].support in ("floor", "against_wall", "corner", "surface")
+    light = max(p.size[:2]) <= PUSHED or any(word in p.object_class for word in ("chair", "stool", "table"))
+    return p.object_class in CLOTH or (stands and light and (bool(p.parent) or p.object_class not in OPENING_CLASSES))
+
+
+def free_openness(house: House, catalogue: Catalogue, *, cleared: bool = False) -> dict[str, float]:
     """How far every part of furniture and every window can open, 0 to 1 by placement id and part, or by opening, until
-    it meets a wall or the box around another thing; handles may touch."""
-    rooms = {r.id: house.floor(r) for r in house.rooms}
-    boxes = [(p, footprint(p), p.position[2], p.position[2] + p.size[2]) for p in house.placements]
+    it meets a wall or the box around another thing; handles may touch.
+
+    Args:
+      cleared: what gives way has been moved away, and blinds are up.
+    """
+    rooms = {r.id: house.floor(r).buffer(NEAR) for r in house.rooms}
+    still = (p for p in house.placements if not (cleared and gives_way(p, catalogue)))
+    low = lambda p: p.position[2] + (p.size[2] - ROLL) * (cleared and p.object_class == "window blind")
+    boxes = [(p, footprint(p), low(p), p.position[2] + p.size[2]) for p in still]
     out = {}
     for p in house.placements:
         whole = apart(catalogue.mesh, p)
@@ -61,22 +71,19 @@ def _swept(p: Placement, m: MovingPart) -> Iterator[tuple[shapely.Geometry, floa
         turn, shift = m.turn(openness)
         there = corners @ turn.T + shift
         outline = shapely.MultiPoint(there[:, :2] @ rotation(p.yaw).T + p.position[:2]).convex_hull
-        yield (
-            outline.buffer(-min(NEAR, 0.4 * float(np.ptp(m.box[:, 1])))),
-            p.position[2] + there[:, 2].min(),
-            p.position[2] + there[:, 2].max(),
-        )
+        low, high = p.position[2] + there[:, 2].min(), p.position[2] + min(there[:, 2].max(), m.top)
+        yield outline.buffer(-min(NEAR, 0.4 * float(np.ptp(m.box[:, 1])))), low, high
 
 
 def _meets(front: tuple, room: shapely.Polygon, others: list[tuple]) -> bool:
     outline, low, high = front
     over = (b for _, b, bottom, top in others if low + NEAR < top and high - NEAR > bottom)
-    return not room.buffer(NEAR).contains(outline) or any(outline.intersects(b) for b in over)
+    return not room.contains(outline) or any(outline.intersects(b) for b in over)
 
 
 def left_open(house: House, catalogue: Catalogue) -> Moment:
     """All that the household has left open, by the house's seed: windows, doors and drawers of furniture, more where it
-    is untidy, and bathroom doors ajar. `left_open(house, catalogue).applied(house)` is such a house."""
+    is untidy, and bathroom doors ajar; where a window is open, blinds are up. `Moment.applied` makes such a house."""
     kinds = {r.id: r.kind for r in house.rooms}
     baths = [o for o in house.openings if o.kind == "door" and {kinds.get(r or "") for r in o.rooms} & {*BATHS}]
     shares = {o.id: (*BATH_DOORS, o.angle / WIDEST) for o in baths if o.leaf_finish is not None}
@@ -86,6 +93,8 @@ def left_open(house: House, catalogue: Catalogue) -> Moment:
     openness = {}
     for name, (share, least, most, free) in shares.items():
         rng = stream(house.seed, "left open", name)
-        if rng.random() < share and free > 0:
+        if rng.random() < share and free > 0 and not name.endswith("/cloth"):
             openness[name] = round(min(float(rng.uniform(least, most)), free), 3)
-    return Moment(openness=openness)
+    aired = {o.rooms[0] for o in house.openings if o.kind in WINDOWS and o.id in openness}
+    raised = (p.id for p in house.placements if p.object_class == "window blind" and p.room in aired)
+    return Moment(openness=openness | {f"{blind}/cloth": 1.0 for blind in raised})
