@@ -17,8 +17,8 @@ OPENNESS_STEPS = np.linspace(0, 1, 19)[1:]
 """Openness that is tried; of doors, every 5 degrees."""
 NEAR = 0.02
 """Metres that things may stand in the way: boxes around them are larger than they are."""
-CLOTH, PUSHED, ROLL = ("curtain", "sheer curtain"), 0.6, 0.08
-"""Classes that are drawn aside, longest side on the floor of what is pushed, height of a raised blind, metres."""
+HANGS, PUSHED, ROLL = ("curtain", "sheer curtain", "pendant lamp"), 0.6, 0.08
+"""Classes that give way, longest side of what is pushed along its wall, and height of a raised blind, metres."""
 LEFT = {"door": (0.1, 0.05, 0.5), "drawer": (0.12, 0.1, 0.6), "lid": (0.8, 1.0, 1.0)}
 """Share of the parts of furniture that a household leaves open at disorder 1, and how far, from and to."""
 BATHS, BATH_DOORS = ("bathroom", "toilet"), (0.6, 0.1, 0.4)
@@ -26,10 +26,10 @@ BATHS, BATH_DOORS = ("bathroom", "toilet"), (0.6, 0.1, 0.4)
 
 
 def gives_way(p: Placement, catalogue: Catalogue) -> bool:
-    """True for what somebody who opens a thing moves first: cloth, seats, tables, bins and lamps, what lies about."""
-    stands = catalogue.assets[p.asset].support in ("floor", "against_wall", "corner", "surface")
-    light = max(p.size[:2]) <= PUSHED or any(word in p.object_class for word in ("chair", "stool", "table"))
-    return p.object_class in CLOTH or (stands and light and (bool(p.parent) or p.object_class not in OPENING_CLASSES))
+    """True for what somebody who opens a thing moves first: curtains, what stands free or is small, what lies about."""
+    support, small = catalogue.assets[p.asset].support, max(p.size[:2]) <= PUSHED
+    stands = support in ("floor", "surface") or (support in ("against_wall", "corner") and small)
+    return p.object_class in HANGS or (stands and (p.parent is not None or p.object_class not in OPENING_CLASSES))
 
 
 def free_openness(house: House, catalogue: Catalogue, *, cleared: bool = False) -> dict[str, float]:
