@@ -38,8 +38,8 @@ THICK = 0.04
 """Metres of a front that touch: the inner edge of a thicker one meets its neighbour as it turns."""
 FOLDS = 6
 """Strips of a blind, which rise before each other: nothing shortens in MuJoCo."""
-THIN = 0.004
-"""Side of a box, metres, below which it is left out."""
+THIN, CEILING = 0.004, 0.02
+"""Side of a box, metres, below which it is left out, and the least height of what is above shelves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +195,7 @@ def boxes_of(case: Case, density: float, solid: Sequence[CollisionBox]) -> Itera
         body = case.bodies[m.name]
         free = [[-GAP, -GAP, -GAP], [GAP, GAP, 1.0]] if m.kind == "lid" else [[-GAP, -1.0, -GAP], [GAP, GAP, GAP]]
         free = [[-1.0, -1.0, -1.0], [1.0, 1.0, 0.0]] if m.kind == "blind" else free
-        for hole in (m.box + free, m.inside):
+        for hole in (m.box + free, m.inside - np.array([[0], [0 if m.slides else CEILING]]) * [0, 0, 1]):
             left = [piece for b in left for piece in collision.without(b, (hole[0], hole[1]))]
         leaf = m.box + np.array([[GAP], [-GAP]]) * [1, 0, 1]
         if m.kind != "lid":
