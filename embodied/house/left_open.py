@@ -15,8 +15,8 @@ from embodied.seeds import stream
 
 OPENNESS_STEPS = np.linspace(0, 1, 19)[1:]
 """Openness that is tried; of doors, every 5 degrees."""
-NEAR = 0.02
-"""Metres that things may stand in the way: boxes around them are larger than they are."""
+NEAR, TOUCH = 0.02, 0.004
+"""Metres that things may stand in the way, as boxes around them are larger than they are, and where that counts."""
 HANGS, PUSHED, ROLL = ("curtain", "sheer curtain", "pendant lamp"), 0.6, 0.08
 """Classes that give way, longest side of what is pushed along its wall, and height of a raised blind, metres."""
 LEFT = {"door": (0.1, 0.05, 0.5), "drawer": (0.12, 0.1, 0.6), "lid": (0.8, 1.0, 1.0)}
@@ -43,12 +43,12 @@ def free_openness(house: House, catalogue: Catalogue, *, cleared: bool = False) 
     still = (p for p in house.placements if not (cleared and gives_way(p, catalogue)))
     low = lambda p: p.position[2] + (p.size[2] - ROLL) * (cleared and p.object_class == "window blind")
     boxes = [(p, footprint(p), low(p), p.position[2] + p.size[2]) for p in still]
-    out = {}
+    out, by = {}, TOUCH if cleared else NEAR
     for p in house.placements:
         whole = apart(catalogue.mesh, p)
         others = [b for b in boxes if b[0].room == p.room and b[0].id != p.id and b[0].parent != p.id]
         for m in whole.moving if whole is not None else ():
-            met = (k for k, front in enumerate(_swept(p, m)) if _meets(front, rooms[p.room], others))
+            met = (k for k, front in enumerate(_swept(p, m, by)) if _meets(front, rooms[p.room], others, by))
             out[f"{p.id}/{m.name}"] = float(([0.0, *OPENNESS_STEPS])[next(met, len(OPENNESS_STEPS))])
     return out | {o.id: _window(house, o, boxes) for o in house.openings if o.kind in WINDOWS}
 
@@ -64,20 +64,20 @@ def _window(house: House, o: Opening, boxes: list[tuple]) -> float:
     return float(np.arcsin(min([wide, *met]) / wide) / WIDEST)
 
 
-def _swept(p: Placement, m: MovingPart) -> Iterator[tuple[shapely.Geometry, float, float]]:
-    """Outline on the floor of a part as it opens, shrunk by NEAR, and its lowest and highest point, metres."""
+def _swept(p: Placement, m: MovingPart, by: float) -> Iterator[tuple[shapely.Geometry, float, float]]:
+    """Outline on the floor of a part as it opens, shrunk by so many metres, and its lowest and highest point."""
     corners = np.array(np.meshgrid(*m.box.T)).reshape(3, -1).T
     for openness in OPENNESS_STEPS:
         turn, shift = m.turn(openness)
         there = corners @ turn.T + shift
         outline = shapely.MultiPoint(there[:, :2] @ rotation(p.yaw).T + p.position[:2]).convex_hull
         low, high = p.position[2] + there[:, 2].min(), p.position[2] + min(there[:, 2].max(), m.top)
-        yield outline.buffer(-min(NEAR, 0.4 * float(np.ptp(m.box[:, 1])))), low, high
+        yield outline.buffer(-min(by, 0.4 * float(np.ptp(m.box[:, 1])))), low, high
 
 
-def _meets(front: tuple, room: shapely.Polygon, others: list[tuple]) -> bool:
+def _meets(front: tuple, room: shapely.Polygon, others: list[tuple], by: float) -> bool:
     outline, low, high = front
-    over = (b for _, b, bottom, top in others if low + NEAR < top and high - NEAR > bottom)
+    over = (b for _, b, bottom, top in others if low + by < top and high - by > bottom)
     return not room.contains(outline) or any(outline.intersects(b) for b in over)
 
 
