@@ -17,7 +17,7 @@ OPENNESS_STEPS = np.linspace(0, 1, 19)[1:]
 """Openness that is tried; of doors, every 5 degrees."""
 NEAR, TOUCH = 0.02, 0.004
 """Metres that things may stand in the way, as boxes around them are larger than they are, and where that counts."""
-HANGS, PUSHED, ROLL = ("curtain", "sheer curtain", "pendant lamp"), 0.6, 0.08
+HANGS, PUSHED, ROLL = ("curtain", "sheer curtain", "pendant lamp", "note", "child's drawing"), 0.6, 0.08
 """Classes that give way, longest side of what is pushed along its wall, and height of a raised blind, metres."""
 LEFT = {"door": (0.1, 0.05, 0.5), "drawer": (0.12, 0.1, 0.6), "lid": (0.8, 1.0, 1.0)}
 """Share of the parts of furniture that a household leaves open at disorder 1, and how far, from and to."""
