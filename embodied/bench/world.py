@@ -4,8 +4,6 @@ wheels, a robot with arms, and views of a panorama.
 With OMP_NUM_THREADS=1 rates are of one core; threads that draw together take more processor time in all.
 """
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math

@@ -5,8 +5,6 @@ something stays or slides along it, an episode ends when the agent stops or afte
 the floor of embodied.navigation.floor_ways. Nothing is drawn here; embodied.gym.continuous does that.
 """
 
-from __future__ import annotations
-
 import enum
 import math
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A robot in the physics of a house: what it feels, how it rolls, what it holds, opens and touches."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

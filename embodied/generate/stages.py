@@ -1,7 +1,5 @@
 """The stages from a seed to a House, each a function from Draft to Draft that can be replaced."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

@@ -8,8 +8,6 @@ Actions: 0 stop, 1 forward, 2 left, 3 right, and for ObjectNav 4 up, 5 down. Eve
 camera. Episodes are the tasks of a `vln` data set, or objects of the houses of any, or a file in Habitat's format.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -1,7 +1,5 @@
 """Ways of people through a house: over the free floor of all storeys, on stairs, and through doors that they open."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

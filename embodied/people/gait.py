@@ -7,8 +7,6 @@ Source: humanoid3d_walk of DeepMimic (X. B. Peng et al., 2018), a walk of the CM
 pybullet 3.2.7 ships it: 38 frames, a cycle of 1.27 s, by least squares.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

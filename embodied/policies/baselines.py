@@ -4,8 +4,6 @@ Those that need privileged information are PrivilegedPolicies and are shown the 
 others see Observations only.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Container, Iterable, Mapping
 from typing import Any, Protocol

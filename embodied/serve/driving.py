@@ -4,8 +4,6 @@ The episode stays one of viewpoints: somebody who drives has moved to a viewpoin
 go straight to. Assistants, measures and learners need not know how people moved.
 """
 
-from __future__ import annotations
-
 import asyncio
 import functools
 import hashlib

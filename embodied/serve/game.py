@@ -1,7 +1,5 @@
 """One episode that people take part in: an environment, whose turn it is, and what was said."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping

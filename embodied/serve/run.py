@@ -1,7 +1,5 @@
 """Opening a study: its data, panoramas and log; and serving it."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import secrets

@@ -1,7 +1,5 @@
 """A study: who does what with whom, how often, and what people are told, from a STUDY.toml; addresses of its page."""
 
-from __future__ import annotations
-
 import ipaddress
 from dataclasses import dataclass
 from pathlib import Path

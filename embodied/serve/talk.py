@@ -1,7 +1,5 @@
 """Help in free words: the rule of play when people talk, who answers, and who plays with people who practise."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any

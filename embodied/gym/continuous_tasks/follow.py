@@ -1,7 +1,5 @@
 """FollowNav: find a person who walks to and fro, and follow at 1 to 2 m (Habitat 3, Puig et al. 2023)."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from embodied.envs.continuous import ContinuousEpisode, NavigationGoal

@@ -5,8 +5,6 @@ observation.state    agent_pos of embodied.gym.lerobot.DriveForLeRobot
 action               what the expert commands there, ahead and left, from -1 to 1
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any

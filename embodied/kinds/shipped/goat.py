@@ -5,8 +5,6 @@ Splits with an open vocabulary are those of HM3D-OVON (Yokoyama et al. 2024, arX
 the same in words that training never says, and classes that training never asks for.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """HANNA: find an object with the help of people one meets (dissertation 4.2)."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 

@@ -1,7 +1,5 @@
 """HARI: reach the one place somebody had in mind, by descriptions and sub-goals (dissertation 4.3)."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import itertools

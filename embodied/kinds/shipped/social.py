@@ -4,8 +4,6 @@ After Gong et al. 2024 (arXiv 2409.13244), whose robot nobody sees, either. On t
 metre. embodied/SocialNav-v0 plays the same tasks with a body; in FollowNav-v0 it follows the first of the people.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """VLN: follow a route instruction to its end (Room-to-Room)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
