@@ -141,7 +141,7 @@ class Driving:
             raise ValueError("there are no houses to drive in; choose another split")
         self.worlds, self.settings = dict(worlds), settings
         self._names = sorted(self.worlds)
-        self._stages: OrderedDict[str, tuple[Driver, FloorWays]] = OrderedDict()
+        self._stages: OrderedDict[str, tuple[Driver, FloorWays, Walks | None, list[str]]] = OrderedDict()
         self.task = driven_task(settings.task)
 
     def reset(self, rng: np.random.Generator, world: str | None = None) -> None:

@@ -118,7 +118,7 @@ def who_is_about(house: House, count: int, *, rng: np.random.Generator) -> list[
 
 
 def draw_strolls(
-    walks: Walks, who: Sequence[str], start: Sequence[float], *, rng: np.random.Generator
+    walks: Walks, who: Sequence[str], start: np.ndarray, *, rng: np.random.Generator
 ) -> tuple[Stroll, ...]:
     """People who walk between rooms, begin away from (x, y, z) `start` and keep apart, also from each other's doors;
     fewer where there is no room for that."""
@@ -137,7 +137,7 @@ def draw_strolls(
             way = tuple((x, y, z) for x, y, z in points.tolist())
             stroll = Stroll(person, way, *seconds, swings=swings, climbs=tuple(walks.climbs))
             walker = Walker(stroll)
-            if math.dist(walker.place(0.0)[:3], start) < ABOUT:
+            if np.linalg.norm(walker.place(0.0)[:3] - start) < ABOUT:
                 continue
             track = np.array([walker.place(t)[:3] for t in times])
             apart = all(np.linalg.norm(track - x, axis=1).min() > 2 * PERSON_RADIUS for x in others)

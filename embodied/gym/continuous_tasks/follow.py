@@ -12,8 +12,8 @@ def follow_source(source: EpisodeSource) -> list[ContinuousEpisode]:
     words, episodes = "find the person and stay 1 to 2 m away, facing them", []
     for e in social_source(source):
         for person in [p for p in e.people if not p.swings][:1]:
-            how = {"goals": (NavigationGoal(person.way[0]),), "people": (person,), "follows": True}
-            episodes.append(dataclasses.replace(e, instruction=words, **how))
+            followed = dataclasses.replace(e, people=(person,), follows=True)
+            episodes.append(dataclasses.replace(followed, instruction=words, goals=(NavigationGoal(person.way[0]),)))
     return episodes
 
 
