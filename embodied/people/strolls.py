@@ -127,7 +127,7 @@ def draw_strolls(
     for person in who:
         for _ in range(TRIES):
             a, b = rng.choice(inside, 2).tolist()
-            seconds = np.round([rng.uniform(*PAUSES), rng.uniform(0, TOGETHER)], 2).tolist()
+            pause, begin = np.round([rng.uniform(*PAUSES), rng.uniform(0, TOGETHER)], 2).tolist()
             ways = ground.wide_ways(np.array([b]))
             if ground.room_of_cell[a] == ground.room_of_cell[b] or not SHORTEST < ways.metres[a] < math.inf:
                 continue
@@ -135,7 +135,7 @@ def draw_strolls(
             points = np.round([*line[:-1:4], line[-1]], 3)
             swings = tuple(s for s in walks.swings if s.stop(line) is not None)
             way = tuple((x, y, z) for x, y, z in points.tolist())
-            stroll = Stroll(person, way, *seconds, swings=swings, climbs=tuple(walks.climbs))
+            stroll = Stroll(person, way, pause, begin, swings, tuple(walks.climbs))
             walker = Walker(stroll)
             if np.linalg.norm(walker.place(0.0)[:3] - start) < ABOUT:
                 continue
