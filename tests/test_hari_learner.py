@@ -12,7 +12,6 @@ from hand_data import built
 from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.agents.common.imitation import TaskSet
 from embodied.agents.common.tensors import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.weights import CheckpointError
 from embodied.agents.hari.networks import (
@@ -35,6 +34,7 @@ from embodied.agents.hari.words import STOP, FeatureWords, collate, feature_word
 from embodied.agents.learners.hari import ExecutionConfig, IntentionConfig
 from embodied.agents.studies.engine import run_study
 from embodied.assistants.descriptions import Describer, frequent_classes
+from embodied.datasets.store import TaskSet
 from embodied.envs.hari import Costs, HariEnv
 from embodied.evaluation.evaluate import play
 from embodied.house.house import House, Opening, Storey

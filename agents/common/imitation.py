@@ -23,6 +23,7 @@ from embodied.agents.common import session as sessions
 from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.common.weights import half_precision, load_into, load_weights, save_weights, seeded
+from embodied.datasets.store import TaskSet
 from embodied.envs.base import HelpEnv
 from embodied.errors import UnableError
 from embodied.evaluation.evaluate import play, rollout
@@ -113,15 +114,6 @@ class Supervised:
     ) -> tuple[Actions, Any]:
         """See embodied.interface.PrivilegedPolicy."""
         return self.policy.play(observations, situations, memory, rngs=rngs, **self.how)
-
-
-@dataclass(frozen=True, eq=False)
-class TaskSet:
-    """Tasks of some houses and the environment they are played in."""
-
-    worlds: Mapping[str, Place]
-    tasks: Sequence[Task]
-    make_env: Callable[[], HelpEnv]
 
 
 def play_with_memory(

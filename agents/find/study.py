@@ -289,7 +289,7 @@ class FindStudy(SightedStudy):
     def where(self, agent: Any, judge: Mapping[str, Any], split: str) -> SplitData:
         places = self.judged_in(judge).places(split)
         tasks = tasks_in(places, self.house_tasks, kind=self.training_data().data.kind)
-        return SplitData(split, places, tuple(tasks), FIND.environments(EnvInputs(places)))
+        return SplitData(places, tasks, FIND.environments(EnvInputs(places)), split)
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return {**super().judged(row, split), "house tasks": self.house_tasks}

@@ -21,7 +21,6 @@ from typing import Unpack
 import torch
 from torch import Tensor
 
-from embodied.agents.common.imitation import TaskSet
 from embodied.agents.common.session import Options, Progress, Session, descend, episode_seed, run, tasks_of_update
 from embodied.agents.common.tensors import Decisions, actor_loss, costs_to_go, critic_loss, side_by_side
 from embodied.agents.common.weights import Stateful, checksum_of, load_into, weights_digest
@@ -31,7 +30,7 @@ from embodied.agents.hari.pretraining import PretrainingData, pretrain
 from embodied.agents.hari.words import feature_words
 from embodied.agents.learners.hari import ExecutionConfig, IntentionConfig
 from embodied.assistants.descriptions import Describer, frequent_classes
-from embodied.datasets.store import Dataset
+from embodied.datasets.store import Dataset, TaskSet
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules, shaped_costs
 from embodied.evaluation.evaluate import play, spread

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, ClassVar, TypeVar, Unpack
 
 from embodied.agents.common import imitation
-from embodied.agents.common.imitation import About, SightedAgent, TaskSet
+from embodied.agents.common.imitation import About, SightedAgent
 from embodied.agents.common.session import Note, Options, Progress
 from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
 from embodied.agents.common.vocabulary import Vocabulary
@@ -25,7 +25,7 @@ from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.live import LiveFeatures
 from embodied.agents.vision.run import drawings_of, drawn_world, house_features, pictures_of
 from embodied.assets.cache import default_cache
-from embodied.datasets.store import Dataset, dataset_of
+from embodied.datasets.store import Dataset, TaskSet, dataset_of
 from embodied.envs.base import DoorRule
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import spread, with_doors

@@ -363,12 +363,12 @@ def generated(evaluation: Evaluation) -> SplitData:
     how = PlaygroundSettings(args.cache, observations=seen, rules=evaluation.rules)
     if args.seed_file is None:
         flat = flat_playground(args.kind, args.seed, how)
-        return SplitData(f"flat_{args.seed}", flat.worlds, flat.tasks, flat.make_env)
+        return SplitData(flat.worlds, flat.tasks, flat.make_env, f"flat_{args.seed}")
     seeds = read_seeds(args.seed_file)
     named = [(f"{evaluation.kind.title.lower()}_{k}", seed) for k, seed in enumerate(seeds)]
     houses, each = bar(named, "houses", "house"), -(-(evaluation.limit or FEW_TASKS) // len(seeds))
     play = houses_playground(args.kind, houses, seeds[0], how, catalogue_of(args), SEEDED_AREA, each, args.part)
-    return SplitData(args.part.replace("_", " ") if args.part else "hidden", play.worlds, play.tasks, play.make_env)
+    return SplitData(play.worlds, play.tasks, play.make_env, args.part.replace("_", " ") if args.part else "hidden")
 
 
 def agent_of(evaluation: Evaluation, name: str, split: SplitData, worlds: Mapping[str, SeenPlace] | None) -> Agent:

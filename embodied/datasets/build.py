@@ -16,14 +16,14 @@ from embodied.assets.cache import digest, drafts, sweep, write_bytes, write_json
 from embodied.assets.catalogue import GROUPS, Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.assistants.route_system import WORDINGS, route_paths, worded
-from embodied.datasets.scale import Scale, quota, scale
+from embodied.datasets.scale import quota, scale
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.furnish.tables import tables_of
 from embodied.generate.novelty import furnishable
 from embodied.generate.people import add_people, place_people
 from embodied.house.house import House, HouseError
 from embodied.interface import Language
-from embodied.kinds.splits import DATASET_SCALES, DatasetSize, SplitPlan
+from embodied.kinds.splits import DATASET_SCALES, DatasetSize, SplitPlan, Splits
 from embodied.kinds.task_kind import TaskInputs, TaskKind, kind_named
 from embodied.language import Landmarks, People, PlainLanguage
 from embodied.locks import LOCK, locked
@@ -104,7 +104,7 @@ class DatasetConfig:
         return kind_named(self.kind)
 
     @property
-    def plan(self) -> Scale:
+    def plan(self) -> Splits:
         """Its houses and splits."""
         return scale(self.scale, self.kind, self.ood)
 
@@ -154,7 +154,7 @@ HouseMaker = Callable[[int, str, HouseConfig, Catalogue], tuple[House, NavGraph]
 """(seed, name, config, catalogue) -> a house and its graph; tests put their own."""
 
 
-def units(wanted: Scale) -> tuple[Unit, ...]:
+def units(wanted: Splits) -> tuple[Unit, ...]:
     return tuple(Unit(group, i) for group, n in wanted.houses.items() for i in range(n))
 
 
@@ -283,14 +283,30 @@ def build_unit(
         return unit.name
     if home.exists():
         raise ValueError(f"{home} is no house of this data set (it has no unit.json); move it away")
-    home.parent.mkdir(parents=True, exist_ok=True)
-    sweep(home.parent)
-    with drafts(home.parent) as private:
-        draft = private / unit.name
-        draft.mkdir()
+    with whole_folder(home) as draft:
         _write_unit(unit, config, draft, load_catalogue(cache, own=own), cache, make_house)
-        draft.rename(home)
     return unit.name
+
+
+@contextlib.contextmanager
+def whole_folder(folder: Path) -> Iterator[Path]:
+    """A private folder that becomes `folder` when everything is written.
+
+    Raises:
+      ValueError: the folder is not empty.
+    """
+    folder = Path(folder)
+    if folder.exists() and any(folder.iterdir()):
+        raise ValueError(f"{folder} is not empty; choose another folder")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    sweep(folder.parent)
+    with drafts(folder.parent) as private:
+        draft = private / folder.name
+        draft.mkdir()
+        yield draft
+        if folder.exists():
+            folder.rmdir()
+        draft.rename(folder)
 
 
 def make_dataset_house(seed: int, name: str, config: HouseConfig, catalogue: Catalogue) -> tuple[House, NavGraph]:

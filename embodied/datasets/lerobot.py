@@ -16,7 +16,6 @@ LeRobotDataset v3.0).
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import json
 import math
@@ -31,9 +30,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from embodied.action_spaces import doors_in
-from embodied.assets.cache import default_cache, drafts, sweep, write_bytes, write_json
+from embodied.assets.cache import default_cache, write_bytes, write_json
 from embodied.assets.catalogue import load_catalogue
 from embodied.assistants.descriptions import described
+from embodied.datasets.build import whole_folder
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.folders import filled
 from embodied.geometry import wrap
@@ -122,27 +122,6 @@ def export_lerobot(
         for episode in episodes:
             _add(writer, episode, data, len(names), succeeded)
         return writer.finish(f"embodied {data.kind}", "lerobot", data)
-
-
-@contextlib.contextmanager
-def whole_folder(folder: Path) -> Iterator[Path]:
-    """A private folder that becomes `folder` when everything is written.
-
-    Raises:
-      ValueError: the folder is not empty.
-    """
-    folder = Path(folder)
-    if folder.exists() and any(folder.iterdir()):
-        raise ValueError(f"{folder} is not empty; choose another folder")
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    sweep(folder.parent)
-    with drafts(folder.parent) as private:
-        draft = private / folder.name
-        draft.mkdir()
-        yield draft
-        if folder.exists():
-            folder.rmdir()
-        draft.rename(folder)
 
 
 def _panoramas(data: Dataset, episode: Episode) -> Iterator[Panorama]:

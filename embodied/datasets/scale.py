@@ -1,25 +1,13 @@
 """The plan of a data set: its houses and splits, by kind of task and size."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
-from embodied.kinds.splits import DATASET_SCALES, PAPER, SMALL_SCALES, DatasetSize, SplitPlan
+from embodied.kinds.splits import DATASET_SCALES, PAPER, SMALL_SCALES, DatasetSize, SplitPlan, Splits
 from embodied.kinds.task_kind import kind_named
 
 OOD = "test_ood"
 """The split of houses out of distribution: models, looks, speakers and words that occur in no other split."""
 
 
-@dataclass(frozen=True)
-class Scale:
-    """The houses and splits of a data set."""
-
-    houses: Mapping[str, int]
-    """Group to number of houses."""
-    splits: tuple[SplitPlan, ...]
-
-
-def scale(size: str | DatasetSize, kind: str, ood: int = 0) -> Scale:
+def scale(size: str | DatasetSize, kind: str, ood: int = 0) -> Splits:
     """The houses and splits of a kind of task.
 
     Args:
@@ -48,7 +36,7 @@ def scale(size: str | DatasetSize, kind: str, ood: int = 0) -> Scale:
         unseen = next(s for s in splits if s.group == "test")
         more = SplitPlan(OOD, "ood", round(unseen.tasks / houses["test"] * ood), unseen.part)
         houses, splits = {**houses, "ood": ood}, (*splits, more)
-    return Scale(dict(houses), splits)
+    return Splits(dict(houses), splits)
 
 
 def quota(total: int, houses: int, index: int) -> int:

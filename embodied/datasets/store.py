@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from embodied.datasets.build import missing_units, units
 from embodied.datasets.checks import DatasetError, check_episode, read_checked, read_config, read_index
-from embodied.datasets.scale import OOD, Scale, quota, scale
+from embodied.datasets.scale import OOD, quota, scale
 from embodied.house.house import House
 from embodied.interface import Assistant, Episode, Place, Route, Task
 from embodied.kinds.splits import SplitPlan
@@ -53,16 +53,22 @@ class StoredPlace:
 
 
 @dataclass(frozen=True, eq=False)
-class SplitData:
-    """A split of a data set, ready to be played."""
+class TaskSet:
+    """Tasks of some houses, ready to be played."""
 
-    name: str
     worlds: Mapping[str, Place]
     """By house name, in the data set's order."""
-    tasks: tuple[Task, ...]
+    tasks: Sequence[Task]
     """House by house."""
     make_env: EnvMaker
     """All that it makes share assistants and caches."""
+
+
+@dataclass(frozen=True, eq=False)
+class SplitData(TaskSet):
+    """A split of a data set."""
+
+    name: str
 
 
 class Dataset:
@@ -80,7 +86,7 @@ class Dataset:
         """
         self.folder = Path(folder)
         self.config = read_config(self.folder)
-        self.scale: Scale = self.config.plan
+        self.scale = self.config.plan
         index = self.folder / "dataset.json"
         if not index.exists():
             missing = len(list(missing_units(self.config, self.folder)))
@@ -251,7 +257,7 @@ class Dataset:
         training = lambda: self.places("train").values()
         inputs = EnvInputs(places, self.routes, wording, voice, training, rules, assistant)
         tasks = self.task_kind.tasks_under((t for t in self.tasks(name) if t.world in places), places, rules)
-        return SplitData(name, places, tasks, self.task_kind.environments(inputs))
+        return SplitData(places, tasks, self.task_kind.environments(inputs), name)
 
     def utterances(self, names: Iterable[str]) -> tuple[Utterance, ...]:
         """Sub-goals in the words of people who spoke of these houses."""

@@ -16,9 +16,10 @@ import numpy as np
 import pyarrow as pa
 from PIL import Image
 
+from embodied.datasets.build import whole_folder
 from embodied.datasets.folders import write_lines
 from embodied.datasets.habitat import with_experts, write_vlnce
-from embodied.datasets.lerobot import STEP_COLUMNS, Columns, Writer, whole_folder
+from embodied.datasets.lerobot import STEP_COLUMNS, Columns, Writer
 from embodied.envs.continuous import (
     POSITION,
     CameraConfig,

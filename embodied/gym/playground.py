@@ -16,13 +16,13 @@ from embodied.assets.closure import code_digest
 from embodied.assets.records import ROOM_KINDS
 from embodied.assistants.route_system import WORDINGS, route_paths, worded
 from embodied.datasets.build import make_dataset_house, with_people
-from embodied.datasets.store import Dataset
+from embodied.datasets.store import Dataset, TaskSet
 from embodied.generate import HouseConfig
 from embodied.gym.semantic_features import semantic_features
 from embodied.gym.sensors import checked_observations
 from embodied.interface import Assistant, Language, Route, SeenPlace, Task
 from embodied.kinds.plugins import assistant_of
-from embodied.kinds.task_kind import EnvInputs, EnvMaker, TaskInputs, TaskKind, kind_named
+from embodied.kinds.task_kind import EnvInputs, TaskInputs, TaskKind, kind_named
 from embodied.language import People, PlainLanguage
 from embodied.render.pictures import PictureSettings, Unlit, parse_pictures
 from embodied.world import makers, open_world
@@ -37,10 +37,7 @@ FLAT_AREA = (70.0, 110.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Playground:
-    worlds: Mapping[str, SeenPlace]
-    tasks: tuple[Task, ...]
-    make_env: EnvMaker
+class Playground(TaskSet):
     features: Mapping[str, np.ndarray]
     """(nodes, 36, D) float32 by world; empty when not asked for."""
 

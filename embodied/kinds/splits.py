@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,12 @@ class SplitSizes:
     """Instead, tasks of every split to evaluate in."""
 
 
-Splits = tuple[Mapping[str, int], tuple[SplitPlan, ...]]
-"""Group to number of houses, and the splits."""
+class Splits(NamedTuple):
+    """The houses and splits of a data set."""
+
+    houses: Mapping[str, int]
+    """Group to number of houses."""
+    splits: tuple[SplitPlan, ...]
 
 
 def five_splits(train: int, val_seen: int, val_unseen: int, test_seen: int, test_unseen: int) -> tuple[SplitPlan, ...]:
@@ -58,7 +63,7 @@ def seen_and_unseen(sizes: SplitSizes) -> Splits:
     """The splits of most kinds."""
     held, tested = sizes.each or max(1, sizes.unseen // 2), sizes.each or sizes.unseen
     houses = {group: sizes.houses[group] for group in ("train", "val", "test")}
-    return houses, five_splits(sizes.tasks, held, held, held, tested)
+    return Splits(houses, five_splits(sizes.tasks, held, held, held, tested))
 
 
 # Scales -----------------------------------------------------------------------------------------

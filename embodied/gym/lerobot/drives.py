@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from embodied.datasets.lerobot import STEP_COLUMNS, Columns, Writer, whole_folder
+from embodied.datasets.build import whole_folder
+from embodied.datasets.lerobot import STEP_COLUMNS, Columns, Writer
 from embodied.gym.driving import expert_action
 from embodied.gym.lerobot import DriveForLeRobot
 from embodied.seeds import stream

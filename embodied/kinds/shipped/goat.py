@@ -87,7 +87,7 @@ def splits(sizes: SplitSizes) -> Splits:
     each, houses = sizes.each or sizes.unseen, {group: sizes.houses[group] for group in ("train", "val", "test")}
     tested = [SplitPlan(f"test_{part}", "test", each, part) for part in (SYNONYMS, UNSEEN_CLASSES)]
     plans = SplitPlan("train", "train", sizes.tasks), SplitPlan("val_unseen", "val", each)
-    return houses, (*plans, SplitPlan("test_unseen", "test", each), *tested)
+    return Splits(houses, (*plans, SplitPlan("test_unseen", "test", each), *tested))
 
 
 class GoatEnv(HelpEnv):

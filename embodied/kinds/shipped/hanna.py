@@ -10,13 +10,13 @@ from embodied.assistants.anna import Anna, Residents
 from embodied.envs.base import HelpEnv, required
 from embodied.interface import Ask, Episode, Mode, Move, Observation, Place, Reply, Stop, Viewpoint
 from embodied.kinds import task_kind
-from embodied.kinds.splits import five_splits
+from embodied.kinds.splits import Splits, five_splits
 from embodied.navigation.graph import NavGraph
 from embodied.policies import baselines
 from embodied.policies.listeners import ListeningInterpreter
 from embodied.tasks.goals import FindConfig, Pool, build_pool, find_instances, find_task, goal_classes
 
-TABLE_4_2 = {"train": 51, "val": 7, "test": 10}, five_splits(82_484, 5_001, 5_017, 5_004, 5_012)
+TABLE_4_2 = Splits({"train": 51, "val": 7, "test": 10}, five_splits(82_484, 5_001, 5_017, 5_004, 5_012))
 """Houses and splits of the dissertation's Table 4.2."""
 NEAR_ENOUGH = 2.0
 """Metres from the target of a sub-task within which it succeeded."""

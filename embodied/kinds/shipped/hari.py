@@ -162,7 +162,7 @@ def splits(sizes: SplitSizes) -> Splits:
     third = sizes.each or max(1, sizes.unseen // 3)
     unseen = sizes.each or sizes.unseen
     plan = _split_plans(sizes.tasks, max(1, sizes.tasks // 10), sizes.tasks, (third,) * 3, (third, third, unseen))
-    return sizes.houses, plan
+    return Splits(sizes.houses, plan)
 
 
 def _split_plans(
@@ -182,7 +182,7 @@ def _split_plans(
     return tuple(plans)
 
 
-TABLE_E_1 = (
+TABLE_E_1 = Splits(
     {"train": 36, "extra": 18, "val": 7, "test": 11},
     _split_plans(82_104, 3_000, 65_133, (1_901, 1_912, 1_967), (1_653, 1_913, 1_777)),
 )
