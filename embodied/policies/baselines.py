@@ -121,8 +121,9 @@ def ask_every_5(observation: Observation, last_asked: int, *, rng: np.random.Gen
 class PrivilegedAsking:
     """A privileged navigation policy with an asking rule in front of it."""
 
-    def __init__(self, navigation: PrivilegedPolicy, rule: AskRule) -> None:
-        self._navigation, self._rule = navigation, rule
+    def __init__(self, navigation: PrivilegedPolicy, rule: AskRule, question: str | None = None) -> None:
+        """`question`: in words, for assistants who understand them."""
+        self._navigation, self._rule, self._question = navigation, rule, question
 
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
@@ -131,7 +132,7 @@ class PrivilegedAsking:
         actions, inner = self._navigation.act_privileged(observations, situations, inner, rngs=rngs)
         for i, o in enumerate(observations):
             if o is not None and o.can_ask and self._rule(o, last[i], rng=rngs[i]):
-                actions[i], last[i] = Ask(o.can_ask[0]), o.time
+                actions[i], last[i] = Ask(o.can_ask[0], question=self._question), o.time
         return actions, (last, inner)
 
 

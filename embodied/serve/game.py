@@ -19,7 +19,7 @@ from embodied.seeds import stream
 from embodied.serve.driving import ACTIONS, BrowserBody
 from embodied.serve.store import Event
 from embodied.serve.study import LONGEST_TEXT, PERSON, StudyPart
-from embodied.serve.talk import Overheard, PathSpeaker, PracticeAgent, Relay, TalkEnv
+from embodied.serve.talk import Overheard, PathSpeaker, Relay, TalkEnv, practice_agent
 
 AgentMaker = Callable[[SplitData], interface.Agent]
 AssistantMaker = Callable[[interface.Assistant], interface.Assistant]
@@ -128,7 +128,7 @@ class Game:
             self.relay = Relay()
             helped = self.table.part.assistant != "none"
             self.env: HelpEnv = TalkEnv(self.table.places, self.relay if helped else None, PanoramicMoves())
-            self.agent: interface.Agent | None = None if "agent" in self.people else PracticeAgent()
+            self.agent: interface.Agent | None = None if "agent" in self.people else practice_agent()
             self.assistant: Any = None if "assistant" in self.people else PathSpeaker()
         else:
             self.env, self.relay = self.table.make_env()

@@ -8,23 +8,10 @@ import numpy as np
 
 from embodied.action_spaces import Moves
 from embodied.envs.base import HelpEnv, required
-from embodied.interface import (
-    Action,
-    Actions,
-    Ask,
-    Intention,
-    Observations,
-    Place,
-    Reply,
-    Rngs,
-    Situation,
-    Situations,
-    Subtask,
-    Viewpoint,
-)
+from embodied.interface import Action, Ask, Intention, Place, Reply, Situation, Subtask, Viewpoint
 from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import nearest
-from embodied.policies.baselines import Shortest
+from embodied.policies.baselines import PrivilegedAsking, Shortest
 
 ASK_EVERY = 3
 """Steps after which somebody to practise with asks."""
@@ -127,18 +114,7 @@ class PathSpeaker:
         return dataclasses.replace(reply, subtask=dataclasses.replace(required(reply.subtask, "way"), id="way"))
 
 
-class PracticeAgent:
+def practice_agent() -> PrivilegedAsking:
     """Takes the shortest way and asks every few steps: somebody to practise answering with."""
-
-    def __init__(self) -> None:
-        self._shortest = Shortest()
-
-    def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
-    ) -> tuple[Actions, Any]:
-        actions, _ = self._shortest.act_privileged(observations, situations, None, rngs=rngs)
-        asked = memory or [-ASK_EVERY] * len(observations)
-        for i, o in enumerate(observations):
-            if o is not None and o.can_ask and o.time - asked[i] >= ASK_EVERY:
-                asked[i], actions[i] = o.time, Ask(question="Where do I go from here?")
-        return actions, asked
+    asks = lambda o, last, *, rng: last < 0 or o.time - last >= ASK_EVERY
+    return PrivilegedAsking(Shortest(), asks, "Where do I go from here?")
