@@ -25,7 +25,6 @@ from embodied.agents.vision.encoder import CELL, HEIGHT, STRIP_COLUMNS, STRIP_RO
 from embodied.assets.cache import DAMAGED, atomic_path
 from embodied.assets.decoding import open_arrays
 from embodied.assets.records import ROOM_KINDS
-from embodied.gym.semantic_features import SightRows
 from embodied.house.house import OPENING_KINDS, House
 from embodied.interface import VIEWS, Sight, Viewpoint, is_picture, viewpoint
 from embodied.render.panorama import Panorama
@@ -118,12 +117,11 @@ class FeatureBank:
         Raises:
           ValueError: another shape, or no world.
         """
-        self._rows = SightRows(worlds)
-        self._table = torch.from_numpy(self._rows.filled(worlds))
+        self._spans, self._table = stacked(worlds)
         self._shown: int | None = None
         self._first = len(self._table)
         self._live, self._other_doors = live, dict[Viewpoint, int]()
-        self.size, self.digest = self._rows.size, digest
+        self.size, self.digest = self._table.shape[2], digest
 
     def to(self, device: torch.device | str) -> FeatureBank:
         """The bank on another device; this one stays."""
@@ -132,10 +130,10 @@ class FeatureBank:
     def with_goal_images(self, pictures: Mapping[str, np.ndarray]) -> FeatureBank:
         """The bank with other features for pictures (embodied.interface.is_picture): of the same worlds, taken at
         another time."""
-        if SightRows(pictures).spans != self._rows.spans or SightRows(pictures).size != self._rows.size:
+        spans, table = stacked(pictures)
+        if spans != self._spans or table.shape[2] != self.size:
             raise ValueError("pictures must be of the same worlds, with as many nodes and features")
-        table = torch.from_numpy(self._rows.filled(pictures)).to(self._table.device)
-        both = torch.cat([self._table, table])
+        both = torch.cat([self._table, table.to(self._table.device)])
         return self._with(_table=both, _shown=len(self._table), _first=len(both))
 
     def blind(self) -> FeatureBank:
@@ -160,17 +158,37 @@ class FeatureBank:
 
     def _row(self, sight: Sight) -> int:
         at = viewpoint(sight)
-        if at.world not in self._rows.spans and self._live is not None:
+        first, end = self._spans.get(at.world, (0, 0))
+        if at.world not in self._spans and self._live is not None:
             if at not in self._other_doors:
                 row = self._other_doors[at] = self._first + len(self._other_doors)
                 if row >= len(self._table):  # twice as many: copied seldom
                     self._table = torch.cat([self._table, torch.zeros_like(self._table)])
                 self._table[row] = torch.from_numpy(self._live(sight)).to(self._table)
             return self._other_doors[at]
-        row = self._rows.row(sight)
-        if self._shown is not None and is_picture(sight):
-            return row + self._shown
-        return row
+        if not 0 <= at.node < end - first:
+            raise KeyError(f"no features of node {at.node} of world {at.world!r}; make them with `embodied features`")
+        return first + at.node + (self._shown if self._shown is not None and is_picture(sight) else 0)
+
+
+def stacked(worlds: Mapping[str, np.ndarray]) -> tuple[dict[str, tuple[int, int]], torch.Tensor]:
+    """Features (nodes, 36, D) of worlds below each other: world to its first row and the one after its last, and
+    (rows, 36, D) float32.
+
+    Raises:
+      ValueError: another shape, or no world.
+    """
+    shapes, spans, count = {name: worlds[name].shape for name in sorted(worlds)}, dict[str, tuple[int, int]](), 0
+    sizes = {s[1:] for s in shapes.values()}
+    if len(sizes) != 1 or any(len(s) != 3 or s[1] != VIEWS for s in shapes.values()):
+        raise ValueError(f"features must all be (nodes, {VIEWS}, D) with one D, got {shapes}")
+    for name, shape in shapes.items():
+        spans[name] = count, count + shape[0]
+        count += shape[0]
+    table = np.zeros((count, *sizes.pop()), np.float32)
+    for name, (first, end) in spans.items():
+        table[first:end] = worlds[name]
+    return spans, torch.from_numpy(table)
 
 
 VISIBLE = 0.003

@@ -28,7 +28,6 @@ from PIL import Image, ImageDraw, ImageOps
 
 from embodied.envs.base import STEP_COST, ActionError, HelpEnv
 from embodied.gym.playground import Playground, PlaygroundSettings, flat_playground, seen_features, split_playground
-from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.sensors import (
     PIXELS,
     CameraSensor,
@@ -43,7 +42,7 @@ from embodied.gym.sensors import (
 from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
 from embodied.house.floor_plan import font, paint_plan
 from embodied.house.house import House
-from embodied.interface import FeatureSource, Observation, Place, Pose, Task
+from embodied.interface import FeatureSource, Observation, Place, Pose, Sight, Task, viewpoint
 from embodied.kinds.metrics import PER_EPISODE
 from embodied.kinds.task_kind import kind_named
 from embodied.language.plain_language import detokenized
@@ -402,11 +401,20 @@ def _sensor_of(play: Playground, wanted: EnvironmentSettings) -> Sensor:
         source = wanted.source if wanted.source is not None else encoder_entry().load()(store)
         sensors.append(FeatureSensor("features", source))
     if "oracle" in seen:
-        oracle = functools.partial(_oracle_of, drawn)  # no lambda: environments are pickled
-        sensors.append(FeatureSensor("oracle", FeatureTable(play.features, oracle)))
+        sensors.append(FeatureSensor("oracle", OracleFeatures(play.features, drawn)))
     return SensorSuite(sensors)
 
 
-def _oracle_of(worlds: Mapping[str, World], name: str) -> np.ndarray:
-    world = place_named(worlds, name)
-    return seen_features(world, world.catalogue, world.cache)
+class OracleFeatures:
+    """A FeatureSource of the semantic features of some worlds; with other doors, made when they are first asked for."""
+
+    def __init__(self, known: Mapping[str, np.ndarray], worlds: Mapping[str, World]) -> None:
+        self._known, self._worlds, self.size = dict(known), worlds, next(iter(known.values())).shape[2]
+
+    def features(self, sight: Sight) -> np.ndarray:
+        """(36, D) float32, read-only by convention; raises KeyError for a place of another world."""
+        at = viewpoint(sight)
+        if at.world not in self._known:
+            world = place_named(self._worlds, at.world)
+            self._known[at.world] = seen_features(world, world.catalogue, world.cache)
+        return self._known[at.world][at.node]
