@@ -107,24 +107,18 @@ def _said(part: str, key: str, **slots: str) -> list[str]:
     return [form.format(**slots) for form in forms[key if key in forms else "else"]]
 
 
-def _one(symbol: str, number: int) -> list[str]:
-    """A symbol as a noun phrase; `number` is that of its letter."""
-    return _said("one", symbol, b=f"{{b{number}}}")
-
-
-def _bare(symbol: str, number: int) -> list[str]:
-    """The same without an article."""
-    return _said("bare", symbol, b=f"{{b{number}}}")
+def _noun(symbol: str, number: int, one: bool) -> list[str]:
+    """A symbol as a noun phrase with (`one`) or without an article; `number` is that of its letter."""
+    return _said("one" if one else "bare", symbol, b=f"{{b{number}}}")
 
 
 def _pair(block: str, one: bool) -> list[str]:
     """Two symbols, as a noun phrase with (`one`) or without an article."""
     a, b = block[0], block[1]
-    nouns = _one if one else _bare
     second = 1 + (a == LETTER)
     phrases = [
         f"{x} {link.format(y)}"
-        for x, y in itertools.product(nouns(a, 1), _one(b, second))
+        for x, y in itertools.product(_noun(a, 1, one), _noun(b, second, True))
         for link in ("followed by {}", "and {} right after it", "with {} behind it")
     ]
     if block == LETTER + LETTER:
@@ -132,29 +126,22 @@ def _pair(block: str, one: bool) -> list[str]:
     if block == ANY + ANY:
         return ["two letters", "any two letters"] if one else ["pair of letters", "two letters"]
     if a == ANY:
-        phrases += [f"{y} and the letter before it" for y in nouns(b, second)]
+        phrases += [f"{y} and the letter before it" for y in _noun(b, second, one)]
     if b == ANY:
-        phrases += [f"{x} and the letter {w} it" for x in nouns(a, 1) for w in ("after", "that follows")]
+        phrases += [f"{x} and the letter {w} it" for x in _noun(a, 1, one) for w in ("after", "that follows")]
     return phrases
 
 
 def _phrases(block: str, one: bool) -> list[str]:
-    if len(block) == 2:
-        return _pair(block, one)
-    return (_one if one else _bare)(block, 1)
+    return _pair(block, one) if len(block) == 2 else _noun(block, 1, one)
 
 
 # What is done to it -------------------------------------------------------------------------------
 
 
-def _operations(replacement: str, what: str) -> list[str]:
-    """Imperatives: what to do to `what`."""
-    return _said("operations", replacement, what=what, new=_new(replacement))
-
-
-def _passives(replacement: str, what: str) -> list[str]:
-    """Phrases of the operation on `what`."""
-    return _said("passives", replacement, what=what, new=_new(replacement))
+def _done(replacement: str, what: str, *forms: str) -> list[str]:
+    """What is done to `what`: as imperatives ('operations'), as phrases ('passives')."""
+    return [said for form in forms for said in _said(form, replacement, what=what, new=_new(replacement))]
 
 
 def _new(replacement: str) -> str:
@@ -168,11 +155,10 @@ def _sayings(shape: RuleShape) -> Iterator[str]:
     """Everything that the grammar can say for a shape."""
     ones, bares = _phrases(shape.block, True), _phrases(shape.block, False)
     for condition in (c for x in ones for c in _said("conditions", shape.anchor, x=x)):
-        for operation in _operations(shape.replacement, "it" if len(shape.block) == 1 else "them"):
+        for operation in _done(shape.replacement, "it" if len(shape.block) == 1 else "them", "operations"):
             yield f"{condition} , {operation}"
     for place in _places(shape, ones, bares):
-        yield from _operations(shape.replacement, place)
-        yield from _passives(shape.replacement, place)
+        yield from _done(shape.replacement, place, "operations", "passives")
     (result,) = _said("result", shape.replacement, new=_new(shape.replacement))
     where = {ANYWHERE: "", START: "start : "}.get(shape.anchor, "end : ")
     yield from (f"{where}{x} -> {result}" for x in ones)
@@ -181,9 +167,7 @@ def _sayings(shape: RuleShape) -> Iterator[str]:
 def _vague_sayings(shape: RuleShape) -> Iterator[str]:
     """As if any letter were meant that stands at the shape's end of the word; nothing for other shapes."""
     if shape.anchor and set(shape.block) != {ANY}:
-        place = _extreme(shape)
-        yield from _operations(shape.replacement, place)
-        yield from _passives(shape.replacement, place)
+        yield from _done(shape.replacement, _extreme(shape), "operations", "passives")
 
 
 def _places(shape: RuleShape, ones: Sequence[str], bares: Sequence[str]) -> list[str]:
