@@ -260,13 +260,9 @@ class _ParsedTemplate:
 
 def _longest(text: str, lexicon: Lexicon) -> _ParsedTemplate | None:
     """The template that accounts for most of the beginning of `text`."""
-    first, best = text.split(" ", 1)[0], None
-    for pattern in _patterns():
-        if pattern.first in ("", first):
-            heard = _read(pattern, text, lexicon)
-            if heard is not None and (best is None or heard.length > best.length):
-                best = heard
-    return best
+    first = text.split(" ", 1)[0]
+    heard = [h for p in _patterns() if p.first in ("", first) and (h := _read(p, text, lexicon)) is not None]
+    return max(heard, key=lambda h: h.length, default=None)
 
 
 def _read(pattern: _Pattern, text: str, lexicon: Lexicon) -> _ParsedTemplate | None:

@@ -161,27 +161,21 @@ def turn_cost(turned: float, wanted: float, *, asked: bool) -> float:
 def walk_cost(clause: meaning.Clause, eyes: Lookout, path: Sequence[int]) -> float:
     """How badly a stretch of walk (its start included) fits one clause."""
     first, last = eyes.at(path[0]), eyes.at(path[-1])
-    crossings = [_way(eyes.at(a), b).leaves for a, b in itertools.pairwise(path)]
+    ways = [_way(eyes.at(a), b) for a, b in itertools.pairwise(path)]
+    crossings = [w.leaves for w in ways]
     if isinstance(clause, meaning.Exit):
         return MISSING * (first.kind != clause.kind) + MISSING * (not any(crossings)) + 1.0 * (sum(crossings) > 1)
-    if isinstance(clause, meaning.Enter):
-        return (
-            MISSING * (last.kind != clause.kind)
-            + MISSING * (not (crossings and crossings[-1]))
-            + 0.8 * (sum(crossings) > 1)
-        )
-    if isinstance(clause, meaning.OpenDoor):
-        opened = [_way(eyes.at(a), b).closed for a, b in itertools.pairwise(path)]
-        return MISSING * (last.kind != clause.kind) + MISSING * (opened[-1:] != [True]) + 0.8 * (sum(crossings) > 1)
+    if isinstance(clause, meaning.Enter | meaning.OpenDoor):
+        through = any(w.leaves if isinstance(clause, meaning.Enter) else w.closed for w in ways[-1:])
+        return MISSING * (last.kind != clause.kind) + MISSING * (not through) + 0.8 * (sum(crossings) > 1)
     if isinstance(clause, meaning.Climb):
-        climbed = any(_way(eyes.at(a), b).climb == clause.way for a, b in itertools.pairwise(path))
+        climbed = any(w.climb == clause.way for w in ways)
         return MISSING * (not climbed) + MISSING * (last.on_stairs != clause.half)
     if isinstance(clause, meaning.Cross):
         kinds = [eyes.at(n).kind for n in path]
         return 1.5 * (clause.kind not in kinds) + 0.7 * sum(k != clause.kind for k in kinds[1:])
     if isinstance(clause, meaning.Metres):
-        length = sum(_way(eyes.at(a), b).length for a, b in itertools.pairwise(path))
-        return 0.9 * max(abs(length - clause.count) - 0.5, 0.0)
+        return 0.9 * max(abs(sum(w.length for w in ways) - clause.count) - 0.5, 0.0)
     if isinstance(clause, meaning.To):
         return near_cost(last, clause.thing)
     if isinstance(clause, meaning.Past):

@@ -148,9 +148,7 @@ def shortened(phrases: Sequence[Phrase], clauses: int) -> list[Phrase]:
         for i in range(len(kept) - 2, 0, -1):
             if len(kept) <= clauses:
                 return kept
-            between_turns = isinstance(kept[i - 1].clause, meaning.Turn) and isinstance(
-                kept[i + 1].clause, meaning.Turn
-            )
+            between_turns = all(isinstance(kept[k].clause, meaning.Turn) for k in (i - 1, i + 1))
             if not between_turns and _DROPPABLE[rank](kept[i].clause, kept[i + 1].clause):
                 del kept[i]
     return kept
