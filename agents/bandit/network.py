@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from embodied.agents.common.tensors import Choice, Rows, greedy_choice, padded
+from embodied.agents.common.tensors import Choice, Remembered, Rows, greedy_choice, padded
 from embodied.agents.common.vocabulary import END_NUMBER, PAD_NUMBER, Vocabulary
 from embodied.agents.common.weights import load_into, load_weights, save_weights
 from embodied.agents.learners.bandit import BanditConfig
@@ -23,18 +23,6 @@ from embodied.records import Identity
 Network = TypeVar("Network", bound=nn.Module)
 SPAN = 0.1
 """Weights begin uniform in [-SPAN, SPAN], as in the authors' program."""
-
-
-@dataclass(frozen=True, eq=False)
-class EncodedSentences(Rows):
-    """B source sentences, read."""
-
-    states: Tensor
-    """(B, S, h) hidden vectors of the encoder."""
-    keys: Tensor
-    """(B, S, h) W_a times states, for attention."""
-    mask: Tensor
-    """(B, S) bool, False on padding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +37,8 @@ class Decoding(Rows):
 
 
 class EncoderDecoder(nn.Module):
-    """Reads a source sentence and says one number-to-be per target word: h^dec."""
+    """Reads a source sentence, remembers the hidden vectors of the encoder with W_a times them as keys, and says one
+    number-to-be per target word: h^dec."""
 
     def __init__(self, source_words: int, target_words: int, size: int) -> None:
         super().__init__()
@@ -61,16 +50,16 @@ class EncoderDecoder(nn.Module):
         self.attend = nn.Linear(size, size, bias=False)
         self.combine = nn.Linear(2 * size, size, bias=False)
 
-    def encode(self, source: Tensor) -> tuple[EncodedSentences, Decoding]:
+    def encode(self, source: Tensor) -> tuple[Remembered, Decoding]:
         """Read (B, S) int64 numbers; the decoder starts where the encoder ended, Phi(x)."""
         lengths = (source != PAD_NUMBER).sum(1)
         packed = nn.utils.rnn.pack_padded_sequence(self.source(source), lengths, batch_first=True, enforce_sorted=False)
         states, (hidden, cell) = self.encoder(packed)
         states, _ = nn.utils.rnn.pad_packed_sequence(states, batch_first=True, total_length=source.shape[1])
-        encoded = EncodedSentences(states, self.attend(states), source != PAD_NUMBER)
+        encoded = Remembered(states, self.attend(states), source != PAD_NUMBER)
         return encoded, Decoding(hidden[0], cell[0], torch.zeros_like(hidden[0]))
 
-    def step(self, encoded: EncodedSentences, now: Decoding, word_gates: Tensor) -> Decoding:
+    def step(self, encoded: Remembered, now: Decoding, word_gates: Tensor) -> Decoding:
         """One step of Eq A.5; `word_gates` (B, 4h) is what the word before adds to the LSTM's gates."""
         gates = word_gates + self.gates(torch.cat([now.output, now.hidden], -1))  # A.5, with input feeding
         enter, forget, leave, content = gates.chunk(4, -1)
@@ -78,7 +67,7 @@ class EncoderDecoder(nn.Module):
         hidden = leave.sigmoid() * cell.tanh()
         scores = torch.bmm(encoded.keys, hidden[:, :, None])[..., 0]  # (B, S) "general": h_t^T W_a h_s
         weights = scores.masked_fill(~encoded.mask, -torch.inf).softmax(-1)
-        context = torch.bmm(weights[:, None], encoded.states)[:, 0]  # (B, h) A.4
+        context = torch.bmm(weights[:, None], encoded.values)[:, 0]  # (B, h) A.4
         return Decoding(hidden, cell, torch.tanh(self.combine(torch.cat([hidden, context], -1))))  # A.3
 
     def word_before(self, words: Tensor) -> Tensor:

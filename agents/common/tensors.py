@@ -55,6 +55,18 @@ class Rows:
         return dataclasses.replace(self, **held)
 
 
+@dataclass(frozen=True, eq=False)
+class Remembered(Rows):
+    """Memory that is attended to: B rows of S vectors of size h."""
+
+    values: Tensor
+    """(B, S, h)."""
+    keys: Tensor
+    """(B, S, h), which are compared with what asks."""
+    mask: Tensor
+    """(B, S) bool, False on padding."""
+
+
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class RunningRows:
     """State that a policy carries between steps. All but `moments` belongs to the k episodes that still run: a tensor

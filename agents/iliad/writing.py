@@ -4,26 +4,12 @@ B data points, S places of what was read, T numbers that are written, h hidden s
 choose from; 0 is padding everywhere.
 """
 
-from dataclasses import dataclass
-
 import torch
 from torch import Tensor, nn
 
-from embodied.agents.common.tensors import Choice, Rows
+from embodied.agents.common.tensors import Choice, Remembered
 
 PAD = 0
-
-
-@dataclass(frozen=True, eq=False)
-class Remembered(Rows):
-    """Memory that is attended to: B rows of S vectors."""
-
-    values: Tensor
-    """(B, S, h)."""
-    keys: Tensor
-    """(B, S, h)."""
-    mask: Tensor
-    """(B, S) bool, False on padding."""
 
 
 class Attention(nn.Module):

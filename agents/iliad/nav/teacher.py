@@ -11,13 +11,13 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from embodied.agents.common.tensors import Choice, greedy_choice, sampled_choice
+from embodied.agents.common.tensors import Choice, Remembered, greedy_choice, sampled_choice
 from embodied.agents.common.vocabulary import END_NUMBER
 from embodied.agents.hanna.attention import DotAttend, FeedForward, MultiAttend
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent, Track
 from embodied.agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
 from embodied.agents.iliad.protocol import NOTHING, DescribingNetworks, one_request
-from embodied.agents.iliad.writing import AttentiveWriter, Bridge, Remembered, before, write
+from embodied.agents.iliad.writing import AttentiveWriter, Bridge, before, write
 from embodied.interface import SeenPlace
 from embodied.kinds.metrics import sdtw
 

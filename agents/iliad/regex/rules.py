@@ -21,9 +21,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from embodied.agents.common.tensors import Choice
+from embodied.agents.common.tensors import Choice, Remembered
 from embodied.agents.common.vocabulary import END_NUMBER, Vocabulary, build_vocabulary
-from embodied.agents.iliad.writing import AttentiveWriter, Bridge, Remembered, before, last, write
+from embodied.agents.iliad.writing import AttentiveWriter, Bridge, before, last, write
 
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 VOWELS = "aeiou"
