@@ -177,7 +177,7 @@ def test_the_skyline_reaches_every_goal_by_sub_goals():
 
 
 def test_the_uncooperative_assistant_answers_other_questions():
-    _, tasks, make = grid_setup(lambda say: Uncooperative(HariAssistant(say)))
+    _, tasks, make = grid_setup(Uncooperative)
     env, heard = make(), set()
     for seed in range(30):
         env.reset(tasks[0], seed=seed)

@@ -58,15 +58,10 @@ class TokenizedCorpora:
 
     def translator(self) -> networks.Translator:
         """An untrained translator; its weights follow from the seed."""
-        source, target = self.lexicons
-        network = networks.Translator(len(source), len(target), self.config.hidden_size)
-        return networks.begin(network, self._generator("translator"))
+        return self._begun(networks.Translator, "translator")
 
     def critic(self) -> networks.Critic:
-        source, target = self.lexicons
-        return networks.begin(
-            networks.Critic(len(source), len(target), self.config.hidden_size), self._generator("critic")
-        )
+        return self._begun(networks.Critic, "critic")
 
     def identity(self, stage: str, *fields: str, **more: object) -> dict[str, object]:
         """The identity of a stage: settings of pre-training and those named, and the corpus."""
@@ -75,8 +70,9 @@ class TokenizedCorpora:
             "embodied.agents.bandit.training", stage=stage, settings=settings, corpus=self.digest, **more
         )
 
-    def _generator(self, name: str) -> torch.Generator:
-        return torch.Generator().manual_seed(int(stream(self.config.seed, "begin", name).integers(2**31)))
+    def _begun(self, kind: Callable[[int, int, int], networks.Network], name: str) -> networks.Network:
+        generator = torch.Generator().manual_seed(int(stream(self.config.seed, "begin", name).integers(2**31)))
+        return networks.begin(kind(*map(len, self.lexicons), self.config.hidden_size), generator)
 
 
 def load_corpus(folder: Path, config: BanditConfig) -> TokenizedCorpora:

@@ -149,14 +149,13 @@ class RecurrentHead(nn.Module):
         nn.init.zeros_(self.out.weight)
         nn.init.zeros_(self.out.bias)
 
-    def begin(self, batch: int) -> tuple[Tensor, Tensor]:
-        """(B, hidden) twice: nothing has been thought."""
-        zero = self.out.weight.new_zeros(batch, self.cell.hidden_size)
-        return zero, zero
+    def begin(self, batch: int) -> Tensor:
+        """(2, B, hidden): nothing has been thought."""
+        return self.out.weight.new_zeros(2, batch, self.cell.hidden_size)
 
     def forward(
-        self, belief: Tensor, shown: Tensor, last: Tensor, depth: Tensor, memory: tuple[Tensor, Tensor]
-    ) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+        self, belief: Tensor, shown: Tensor, last: Tensor, depth: Tensor, memory: Tensor
+    ) -> tuple[Tensor, Tensor]:
         """One step.
 
         Args:
@@ -172,7 +171,7 @@ class RecurrentHead(nn.Module):
         parts = [belief, shown, self.last(last)]
         if self.knows_stack:
             parts.append(nn.functional.one_hot((depth - 1).clamp(0, DEPTHS - 1), DEPTHS).to(belief.dtype))
-        memory = self.cell(torch.cat(parts, -1), memory)
+        memory = torch.stack(self.cell(torch.cat(parts, -1), memory.unbind()))
         return self.out(memory[0]), memory
 
 

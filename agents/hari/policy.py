@@ -149,8 +149,8 @@ class HariMemory:
     """The recurrent state of a learned agent in B episodes."""
 
     belief: Belief
-    actor: tuple[Tensor, Tensor]
-    """(B, hidden) twice."""
+    actor: Tensor
+    """(2, B, hidden)."""
     last: Tensor
     """(B,) int64: 0, or 1 + the intention before."""
 
@@ -208,8 +208,7 @@ class HariPolicy:
         shown = networks.shown_probabilities(considered.log_moves).clone()
         inputs = considered.belief.clone(), shown, mind.last[rows], depth
         possible = torch.from_numpy(np.stack([available(o) for o in seen if o is not None]))
-        before = (mind.actor[0][rows], mind.actor[1][rows])
-        scores, after = self.actor(*inputs, before)
+        scores, after = self.actor(*inputs, mind.actor[:, rows])
         logits = scores.masked_fill(~possible, -torch.inf)
         p = logits.detach().double().softmax(-1).numpy()
         drawn = [
@@ -227,9 +226,8 @@ class HariPolicy:
         if self.choices is not None:
             self.choices.append(Choice(rows, logits, intentions, *inputs))
         index = torch.tensor(rows)
-        actor = tuple(old.index_put((index,), new) for old, new in zip(mind.actor, after, strict=True))
         last = mind.last.index_put((index,), intentions + 1)
-        return actions, HariMemory(carry(considered, belief), (actor[0], actor[1]), last)
+        return actions, HariMemory(carry(considered, belief), mind.actor.index_copy(1, index, after), last)
 
 
 @dataclass(eq=False)

@@ -126,10 +126,8 @@ def values(critic: networks.RecurrentHead, choices: Sequence[Choice], batch: int
     """(B, T) V of the costs to come at each step, by the critic's own memory; zero behind the ends."""
     memory, out = critic.begin(batch), []
     for c in choices:
-        before = (memory[0][c.rows], memory[1][c.rows])
-        value, after = critic(c.belief, c.shown, c.last, c.depth, before)
-        index = torch.tensor(c.rows)
-        memory = (memory[0].index_put((index,), after[0]), memory[1].index_put((index,), after[1]))
+        value, after = critic(c.belief, c.shown, c.last, c.depth, memory[:, c.rows])
+        memory = memory.index_copy(1, torch.tensor(c.rows), after)
         out.append(_spread(value[:, 0], c.rows, batch))
     return torch.stack(out, 1)
 

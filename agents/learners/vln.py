@@ -47,6 +47,7 @@ class FollowerSettings(settings.SightedSettings):
     """Longest instruction, words; the rest is cut."""
 
 
+JUDGING = Settings(options.EVALUATION, settings.EvaluationSettings(), skip=("ask_threshold",))
 VLN_SCALES = settings.scales(FollowerSettings, "vln")
 """'mini': ten minutes of one core, and twenty more where paths are not worded yet; 'paper': for one GPU."""
 
@@ -56,10 +57,7 @@ class FollowerTraining(options.SightedRun):
     """An agent that follows route instructions, on a VLN or HANNA data set with features (imitation)."""
 
     config: Annotated[FollowerSettings, Settings(options.TRAINING, VLN_SCALES)]
-    evaluation: Annotated[
-        settings.EvaluationSettings,
-        Settings(options.EVALUATION, settings.EvaluationSettings(), skip=("ask_threshold",)),
-    ]
+    evaluation: Annotated[settings.EvaluationSettings, JUDGING]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,10 +69,7 @@ class VlnStudyOptions(options.EpisodeStudyOptions, options.Encoded):
     others: Count = 1
     """Training seeds of all rows but the first."""
     config: Annotated[FollowerSettings, Settings(options.TRAINING, VLN_SCALES, skip=("forcing", "blind", "wordless"))]
-    evaluation: Annotated[
-        settings.EvaluationSettings,
-        Settings(options.EVALUATION, settings.EvaluationSettings(), skip=("ask_threshold",)),
-    ]
+    evaluation: Annotated[settings.EvaluationSettings, JUDGING]
 
 
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:

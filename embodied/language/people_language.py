@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from embodied.interface import FindObject, Language, SeenPlace
+from embodied.interface import Language, SeenPlace
 from embodied.language.clauses import STOPS, Forward, RouteInstruction, StopHere, Turn
 from embodied.language.grammar import parse, say
 from embodied.language.lexicon import lexicon_of
@@ -34,6 +34,7 @@ class People:
 
     habits: Mapping[str, Any] = {}
     """In which these speakers differ from others: fields of Speaker."""
+    request, subgoal = PlainLanguage().request, PlainLanguage().subgoal
 
     def __init__(self, tries: int = len(GROWTH), novelty: str | None = None) -> None:
         """
@@ -43,11 +44,6 @@ class People:
         """
         check_novelty(novelty)
         self.tries, self.novelty = tries, novelty
-        self._plain = PlainLanguage()
-
-    def request(self, goal: FindObject, *, rng: np.random.Generator) -> str:
-        """'find a mug', 'find a towel in a bathroom'."""
-        return self._plain.request(goal, rng=rng)
 
     def route(self, world: SeenPlace, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
         """'Leave the bedroom and turn left at once. Walk past the piano. Stop by the coffee table.'
@@ -71,10 +67,6 @@ class People:
             if missed < least:
                 best, least = text, missed
         return best
-
-    def subgoal(self, words: Sequence[str]) -> str:
-        """VNLA's sub-goals in words."""
-        return self._plain.subgoal(words)
 
 
 class Landmarks(People):
@@ -117,20 +109,14 @@ class PeoplesWords:
     """A `Language` with people's sub-goals where people meant the same actions, and another language's elsewhere."""
 
     def __init__(self, utterances: Iterable[Utterance], other: Language) -> None:
-        self._other = other
+        self.request, self.route, self._subgoal = other.request, other.route, other.subgoal
         self._texts: defaultdict[tuple[str, ...], list[str]] = defaultdict(list)
         for u in utterances:
             self._texts[u.words].append(u.text)
-
-    def request(self, goal: FindObject, *, rng: np.random.Generator) -> str:
-        return self._other.request(goal, rng=rng)
-
-    def route(self, world: Any, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
-        return self._other.route(world, path, yaw, rng=rng)
 
     def subgoal(self, words: Sequence[str]) -> str:
         """Of several people's words for these actions, always the same ones."""
         texts = self._texts.get(tuple(w for w in words if w != "stop"))
         if not texts:
-            return self._other.subgoal(words)
+            return self._subgoal(words)
         return texts[int(stream(0, "said", *words).integers(len(texts)))]

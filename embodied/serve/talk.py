@@ -101,15 +101,12 @@ def way_to_goal(situation: Situation, steps: int = 0) -> tuple[int, ...]:
 class PathSpeaker:
     """The simulated assistant where a data set has none: says the shortest way in plain words."""
 
-    def __init__(self) -> None:
-        self._language = PlainLanguage()
-
     def intentions(self, situation: Situation) -> tuple[Intention, ...]:
         return (Intention.HELP,)
 
     def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
         path = way_to_goal(situation)
-        words = self._language.route(situation.world, path, situation.pose.yaw, rng=rng) if len(path) > 1 else None
+        words = PlainLanguage().route(situation.world, path, situation.pose.yaw, rng=rng) if len(path) > 1 else None
         reply = spoken_reply(situation, words or "You are there.", None, 0)
         return dataclasses.replace(reply, subtask=dataclasses.replace(required(reply.subtask, "way"), id="way"))
 

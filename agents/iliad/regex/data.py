@@ -140,8 +140,8 @@ def _phrases(block: str, one: bool) -> list[str]:
 
 
 def _done(replacement: str, what: str, *forms: str) -> list[str]:
-    """What is done to `what`: as imperatives ('operations'), as phrases ('passives')."""
-    return [said for form in forms for said in _said(form, replacement, what=what, new=_new(replacement))]
+    """Sayings that `what` becomes a replacement: as imperatives ('operations'), as phrases ('passives')."""
+    return [text for form in forms for text in _said(form, replacement, what=what, new=_new(replacement))]
 
 
 def _new(replacement: str) -> str:

@@ -36,10 +36,16 @@ class _ForLeRobot(gym.Wrapper[dict[str, Any], np.ndarray, Any, Any]):
 
     env: Any
 
-    def __init__(self, env: Any, height: int, width: int, numbers: int) -> None:
-        """`numbers`: of agent_pos."""
+    def __init__(self, env: Any, sides: Any, numbers: int, steps: int, task: str) -> None:
+        """
+        Args:
+          sides: what has the `height` and `width` of pictures.
+          numbers: of agent_pos.
+          steps: most of an episode.
+        """
         super().__init__(env)
-        self._black = np.zeros((height, width, 3), np.uint8)
+        self._black = np.zeros((sides.height, sides.width, 3), np.uint8)
+        self.task, self._max_episode_steps = task, steps
         seen = spaces.Box(0, 255, self._black.shape, np.uint8)
         position = spaces.Box(-LARGE, LARGE, (numbers,), np.float32)
         self.observation_space = spaces.Dict({"pixels": seen, "agent_pos": position})
@@ -48,6 +54,7 @@ class _ForLeRobot(gym.Wrapper[dict[str, Any], np.ndarray, Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         o, info = self.env.reset(seed=seed, options=options)
+        self.task_description: str = info.get("instruction") or info["request"]
         return self._seen(o), info | {"is_success": False}
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
@@ -69,19 +76,8 @@ class ContinuousForLeRobot(_ForLeRobot):
 
     def __init__(self, env: continuous.ContinuousGymEnv) -> None:
         camera, body = env.dataset.camera, env.dataset.body
-        super().__init__(env, camera.height, camera.width, len(POSITION))
+        super().__init__(env, camera, len(POSITION), body.steps, env.dataset.task.name)
         self.action_space = spaces.Box(-1.0, 1.0, (body.actions,), np.float32)
-        self._max_episode_steps = body.steps
-
-    @property
-    def task_description(self) -> str:
-        """The instruction."""
-        return self.env.task_description
-
-    @property
-    def task(self) -> str:
-        """The name of the task."""
-        return self.env.dataset.task.name
 
     def _command(self, action: np.ndarray) -> int:
         return int(np.argmax(action))
@@ -95,19 +91,10 @@ class DriveForLeRobot(_ForLeRobot):
 
     def __init__(self, env: drive.DriveEnv) -> None:
         settings = env.driving.settings
-        super().__init__(env, settings.height, settings.width, _driven(settings))
+        steps = round(settings.seconds / settings.control)
+        super().__init__(env, settings, _driven(settings), steps, settings.task)
         self.action_space = env.action_space
         self._parts = [name for name in DRIVEN if name in drive.seen_space(settings)]
-        self._max_episode_steps = round(settings.seconds / settings.control)
-
-    @property
-    def task_description(self) -> str:
-        """The request."""
-        return self.env.driving.goal.request
-
-    @property
-    def task(self) -> str:
-        return self.env.driving.settings.task
 
     def _state(self, o: dict[str, Any]) -> np.ndarray:
         return np.concatenate([o[name] for name in self._parts]).astype(np.float32)

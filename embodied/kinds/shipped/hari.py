@@ -98,18 +98,12 @@ class HariAssistant:
         raise ValueError(f"HARI's assistant answers cur, goal and sub, was asked {question.value!r}")
 
 
-class Uncooperative:
+class Uncooperative(HariAssistant):
     """Answers a question drawn from those that could be asked, whatever was asked (Table 4.7)."""
-
-    def __init__(self, assistant: HariAssistant) -> None:
-        self._assistant = assistant
-
-    def intentions(self, situation: Situation) -> tuple[Intention, ...]:
-        return self._assistant.intentions(situation)
 
     def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
         some = self.intentions(situation)
-        return self._assistant.answer(situation, some[int(rng.integers(len(some)))], rng=rng)
+        return super().answer(situation, some[int(rng.integers(len(some)))], rng=rng)
 
 
 def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.PartTasks:
@@ -197,8 +191,8 @@ def environments(inputs: task_kind.EnvInputs) -> task_kind.EnvMaker:
     rules: HariRules = inputs.rules
     houses = inputs.worlds.values() if inputs.training is None else inputs.training()
     describer = Describer(frequent_classes(houses, rules.kept))
-    willing = HariAssistant(describer, stack=rules.stack, longest=rules.longest)
-    assistant = inputs.assistant or (willing if rules.cooperative else Uncooperative(willing))
+    kind = HariAssistant if rules.cooperative else Uncooperative
+    assistant = inputs.assistant or kind(describer, stack=rules.stack, longest=rules.longest)
     ways = PanoramicMoves()
     return lambda: HariEnv(inputs.worlds, assistant, describer, costs=rules.costs, moves=ways)
 
