@@ -602,7 +602,7 @@ def test_vnlas_advisor_says_what_people_said_of_the_same_actions(tmp_path):
     words = worded_by_people(tmp_path / "people")
     made = write_people_dataset(data, words, tmp_path / "made")
     (said,) = made.utterances([task.world])
-    actions, end = VnlaTeacher().words(data.place(task.world), task.start, (path[-1],), 99)
+    actions, end = VnlaTeacher().plan(data.place(task.world)).words(task.start, (path[-1],), 99)
     assert (*said.words, "stop") == actions and end.node == path[-1]
     voice = PeoplesWords([said], PlainLanguage())
     assert voice.subgoal(said.words) == "over there" and voice.subgoal(("left", *said.words)) != "over there"

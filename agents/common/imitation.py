@@ -148,6 +148,8 @@ class ImitationLearner:
     """An agent in training; who derives from it says `player` and `loss_of`, or `learn` as a whole."""
 
     optimizer_kind: ClassVar[type[torch.optim.Adam]] = torch.optim.Adam
+    _player: Agent
+    """Who plays, where that is always the same."""
 
     def __init__(self, agent: Any, training: Any) -> None:
         """
@@ -161,29 +163,17 @@ class ImitationLearner:
             agent.network.parameters(), self.config.learning_rate, weight_decay=self.config.weight_decay
         )
 
-    def player(self, update: int, bank: Any) -> Agent:
-        """Who plays the batch of an update, with the features that it is shown."""
+    def player(self, update: int) -> Agent:
+        """Who plays the batch of an update."""
+        return self._player
+
+    def loss_of(self, episodes: Sequence[Episode], memory: Any) -> BatchLoss:
+        """The losses of a batch of finished episodes, by the player's last memory, and what is reported of it."""
         raise NotImplementedError
 
-    def experience(self, episodes: Sequence[Episode], memory: Any) -> Any:
-        """Training data, of finished episodes and the player's last memory: its moments, where it had labels."""
-        return memory.moments
-
-    def loss_of(self, episodes: Sequence[Episode], experience: Any) -> BatchLoss:
-        """The losses of a batch, and what is reported of it."""
-        raise NotImplementedError
-
-    def training_task(self, task: Task) -> Task:
-        """A task as it is in training, with its horizon."""
+    def timed(self, task: Task, training: bool) -> Task:
+        """A task with its horizon in training, or in evaluation."""
         return task
-
-    def evaluation_task(self, task: Task) -> Task:
-        """A task as it is in evaluation, with its horizon."""
-        return task
-
-    def evaluated_agent(self, split: Any) -> Agent:
-        """The agent as it is evaluated, with the features of `split`."""
-        return self.agent.policy(split.bank)
 
     def learn(self, update: int) -> Mapping[str, float]:
         """One update: play a batch, compute its loss, take a gradient step; the numbers to report.
@@ -194,14 +184,13 @@ class ImitationLearner:
         """
         config, training = self.config, self.training
         chosen = sessions.tasks_of_update(training.tasks, update, config.batch, config.seed)
-        tasks, seed = [self.training_task(t) for t in chosen], sessions.episode_seed(config.seed, update)
-        player = self.player(update, training.bank)
+        tasks, seed = [self.timed(t, training=True) for t in chosen], sessions.episode_seed(config.seed, update)
+        player = self.player(update)
         try:
             with sessions.seeded_dropout(config.seed, update):
                 self.network.train()
                 episodes, memory = play_with_memory(training.make_env, player, tasks, seed=seed)
-                experience = self.experience(episodes, memory)
-                batch_loss = self.loss_of(episodes, experience)
+                batch_loss = self.loss_of(episodes, memory)
                 rate = config.learning_rate
                 sessions.set_learning_rate(self.optimizer, rate, update, config.iterations, config.cooldown)
                 norm = sessions.descend(batch_loss.loss, self.optimizer, f"update {update}")
@@ -256,13 +245,14 @@ def asked(episodes: Sequence[Episode], logits: Tensor, labels: Tensor) -> dict[s
     return numbers
 
 
-def validate(learner: ImitationLearner, split: TaskSet, session: sessions.Session) -> Sequence[Episode]:
+def validate(learner: ImitationLearner, split: Any, session: sessions.Session) -> Sequence[Episode]:
     """Play validation tasks as in evaluation; keep the agent if it is as good as the best so far."""
     config = learner.config
-    tasks = [learner.evaluation_task(t) for t in split.tasks[: config.validation_tasks]]
+    tasks = [learner.timed(t, training=False) for t in split.tasks[: config.validation_tasks]]
     learner.network.eval()
     with torch.inference_mode():
-        episodes = play(split.make_env, learner.evaluated_agent(split), tasks, seed=config.seed, batch=VALIDATION_BATCH)
+        player = learner.agent.policy(split.bank)
+        episodes = play(split.make_env, player, tasks, seed=config.seed, batch=VALIDATION_BATCH)
     values = {
         name: sum(f(e, split.worlds[e.task.world].graph) for e in episodes) / len(episodes)
         for name, f in metrics.PER_EPISODE.items()

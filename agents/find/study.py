@@ -134,13 +134,14 @@ class FindLearner(imitation.ImitationLearner):
 
     def learn(self, update: int) -> Mapping[str, float]:
         c, numbers, searches = self.config, dict[str, float](), list[Search]()
-        if update >= SINGLE_VIEWS * c.iterations:
+        if update >= SINGLE_VIEWS * c.iterations and c.agent != "detector":
             self.network.eval()
             searches, numbers = self._search(update)
         self.network.train()
         with seeded_dropout(c.seed, update):
             set_learning_rate(self.optimizer, c.learning_rate, update, c.iterations, c.cooldown)
-            loss = self._labels.loss(self.network, looks_of(self._labels, c.seed, update))
+            seen = stream(c.seed, "looks", update).integers(len(self._labels.seen), size=LOOKS)
+            loss = self._labels.loss(self.network, torch.from_numpy(seen))
             numbers["reading"] = float(loss.detach())
             if searches:
                 imitated, right = imitation_loss(self.network, searches)
@@ -169,11 +170,11 @@ def train_finder(source: TrainingData, config: FinderConfig, folder: Path, cache
     finder = new_finder(about, requests)
     identity = identity_of("embodied.agents.find.study", settings=config, **source.identity())
     looks = dataclasses.replace(training, bank=finder.policy(training.bank).bank)
-    labels = labels_of(source.data, looks, classes, cache)
+    learner = FindLearner(finder, training, labels_of(source.data, looks, classes, cache))
     if config.agent == "detector":
-        explorer_of(finder, labels, validation, note=note).save(folder / "best.safetensors", identity)
+        explorer_of(learner, validation, note=note).save(folder / "best.safetensors", identity)
         return
-    imitation.train(FindLearner(finder, training, labels), validation, folder, identity, note=note)
+    imitation.train(learner, validation, folder, identity, note=note)
 
 
 # What there is to be read -------------------------------------------------------------------------
@@ -231,15 +232,11 @@ def labels_of(data: Dataset, split: Split, classes: Sequence[str], cache: Path) 
     return Labels(*(torch.cat(x) for x in zip(*parts, strict=True)))
 
 
-def explorer_of(finder: Finder, labels: Labels, validation: Split, *, note: Note) -> Finder:
+def explorer_of(learner: FindLearner, validation: Split, *, note: Note) -> Finder:
     """The finder that explores, with patience and bar chosen in validation houses, once its readers have learned."""
-    c, explorer = finder.about.config, finder.network
-    assert isinstance(explorer, Explorer)
-    optimizer = torch.optim.AdamW(explorer.parameters(), c.learning_rate, weight_decay=c.weight_decay)
-    for update in range(c.iterations):
-        with seeded_dropout(c.seed, update):
-            set_learning_rate(optimizer, c.learning_rate, update, c.iterations, c.cooldown)
-            descend(labels.loss(explorer, looks_of(labels, c.seed, update)), optimizer, f"update {update}", CLIP)
+    finder, explorer = learner.agent, learner.network
+    for update in range(learner.config.iterations):
+        learner.learn(update)
     explorer.eval()
     scores = {}
     for patience in PATIENCES:
@@ -253,11 +250,6 @@ def explorer_of(finder: Finder, labels: Labels, validation: Split, *, note: Note
             note(f"explorer, patience {patience:g}, bar {bar:g}: validation success {scores[patience, bar]:.3f}")
     explorer.ruled(*max(scores, key=lambda k: scores[k]))
     return finder
-
-
-def looks_of(labels: Labels, seed: int, update: int) -> torch.Tensor:
-    """(LOOKS,) viewpoints of one update."""
-    return torch.from_numpy(stream(seed, "looks", update).integers(len(labels.seen), size=LOOKS))
 
 
 SEVERAL = ("Seeing", "Blind")

@@ -271,20 +271,12 @@ class HannaLearner(SightedLearner):
         routes = [r.instruction for n in training.worlds for r in data.routes(n) if r.split == "train_seen"]
         return build_vocabulary([*(t.request for t in training.tasks), *routes], 2)
 
-    def training_task(self, task: Task) -> Task:
-        return dataclasses.replace(task, horizon=self.config.training_steps)
+    def timed(self, task: Task, training: bool) -> Task:
+        steps = self.config.training_steps if training else self.evaluation.evaluation_steps
+        return dataclasses.replace(task, horizon=steps)
 
-    def evaluation_task(self, task: Task) -> Task:
-        return dataclasses.replace(task, horizon=self.evaluation.evaluation_steps)
-
-    def player(self, update: int, bank: FeatureBank) -> Agent:
-        return dataclasses.replace(self._player, bank=bank)
-
-    def experience(self, episodes: Sequence[Episode], memory: HannaMemory) -> Experience:
-        return labelled(episodes, memory.moments, self._teacher, self.training.worlds)
-
-    def loss_of(self, episodes: Sequence[Episode], experience: Experience) -> imitation.BatchLoss:
-        c, x = self.config, experience
+    def loss_of(self, episodes: Sequence[Episode], memory: HannaMemory) -> imitation.BatchLoss:
+        c, x = self.config, labelled(episodes, memory.moments, self._teacher, self.training.worlds)
         losses = imitation_loss(x, c.alpha, c.batch, c.curiosity_floor)
         known, askable = x.right_moves != IGNORE, x.right_asks != IGNORE
         numbers = {

@@ -127,12 +127,6 @@ def recolour(image: np.ndarray, uneven: float = 0.0, *, rng: np.random.Generator
     return np.clip(recoloured * shade[..., None], 0, 255).astype(np.uint8)
 
 
-def frequent_classes(houses: Sequence[HouseStrips], least: int) -> list[int]:
-    """Indices of the classes visible in at least `least` views of `houses`."""
-    count = sum(visible_in_views(h.share).sum((0, 1)) for h in houses)
-    return [int(i) for i in np.flatnonzero(count >= least)]
-
-
 def train_encoder(
     houses: Sequence[HouseStrips], config: VisionConfig, folder: Path, *, device: str = "cpu", note: Note = print
 ) -> tuple[encoders.Encoder, list[str]]:
@@ -154,14 +148,15 @@ def train_encoder(
 
 
 def classes_of(houses: Sequence[HouseStrips], config: StripTraining) -> list[int]:
-    """Indices of the classes to learn.
+    """Indices of the classes to learn: those that are visible in enough views.
 
     Raises:
       ValueError: no strips, or strips with different classes.
     """
     if not houses or len({h.classes for h in houses}) != 1:
         raise ValueError("training needs strips of at least one house, all with the same list of classes")
-    return frequent_classes(houses, config.least_views)
+    count = sum(visible_in_views(h.share).sum((0, 1)) for h in houses)
+    return np.flatnonzero(count >= config.least_views).tolist()
 
 
 def learn(

@@ -19,9 +19,8 @@ from embodied.agents.common.tensors import IGNORE, choose_sampled, negative_log_
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.learners.vln import FollowerSettings
 from embodied.agents.studies.tables import study_tables
-from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import SightedLearner, SightedStudy, Split, TrainingData
-from embodied.agents.vln.policy import VlnAgent, VlnMoment
+from embodied.agents.vln.policy import VlnAgent, VlnMemory, VlnMoment
 from embodied.assets.cache import digest
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import code_digest
@@ -52,20 +51,21 @@ class VlnLearner(SightedLearner):
     def words_of(cls, data: Dataset, training: Split) -> Vocabulary:
         return build_vocabulary(t.request for t in training.tasks)
 
-    def training_task(self, task: Task) -> Task:
-        return dataclasses.replace(task, horizon=min(task.horizon, LONGEST_EPISODE))
+    def timed(self, task: Task, training: bool) -> Task:
+        return dataclasses.replace(task, horizon=min(task.horizon, LONGEST_EPISODE)) if training else task
 
-    def player(self, update: int, bank: FeatureBank) -> Agent:
+    def player(self, update: int) -> Agent:
         dropout, share = self.config.environment_dropout, teacher_share(self.config, update)
-        policy = dataclasses.replace(self.agent.policy(bank), choose=choose_sampled, environment_dropout=dropout)
+        policy = self.agent.policy(self.training.bank)
+        policy = dataclasses.replace(policy, choose=choose_sampled, environment_dropout=dropout)
         return imitation.Supervised(policy, {"guided": lambda _, rng: bool(rng.random() < share)})
 
-    def loss_of(self, episodes: Sequence[Episode], experience: Sequence[VlnMoment]) -> imitation.BatchLoss:
-        c = self.config
-        moves, left, rooms = losses_of(experience, c.batch)
-        right = torch.cat([m.said.moves.argmax(-1) == m.moves for m in experience])
-        known = torch.cat([m.rooms.flatten() for m in experience])
-        guessed = torch.cat([m.said.rooms.argmax(-1).flatten() for m in experience])
+    def loss_of(self, episodes: Sequence[Episode], memory: VlnMemory) -> imitation.BatchLoss:
+        c, moments = self.config, memory.moments
+        moves, left, rooms = losses_of(moments, c.batch)
+        right = torch.cat([m.said.moves.argmax(-1) == m.moves for m in moments])
+        known = torch.cat([m.rooms.flatten() for m in moments])
+        guessed = torch.cat([m.said.rooms.argmax(-1).flatten() for m in moments])
         numbers = {
             "right moves": float(right.float().mean()),
             "right rooms": float((guessed == known)[known != IGNORE].float().mean()),

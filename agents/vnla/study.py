@@ -30,7 +30,7 @@ from embodied.agents.studies.tables import study_tables
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import SightedLearner, SightedStudy, Split, TrainingData
 from embodied.agents.vnla.network import VnlaNetwork, lessons_of, reading_loss
-from embodied.agents.vnla.policy import VnlaMoment, VnlaPolicy, for_training
+from embodied.agents.vnla.policy import VnlaMemory, VnlaMoment, VnlaPolicy, for_training
 from embodied.datasets.store import Dataset, SplitData
 from embodied.interface import Agent, Episode
 from embodied.kinds.shipped.vnla import HELP_STEPS, VNLA
@@ -126,9 +126,9 @@ class VnlaLearner(SightedLearner):
 
     def __init__(self, agent: VnlaAgent, training: Split) -> None:
         super().__init__(agent, training)
-        self._player = for_training(agent.policy(training.bank), VnlaTeacher())
-        shown = dataclasses.replace(training, bank=self._player.policy.bank)
-        self._lessons = lessons_of(shown, agent.vocabulary)
+        policy = agent.policy(training.bank)
+        self._player = for_training(policy, VnlaTeacher())
+        self._lessons = lessons_of(dataclasses.replace(training, bank=policy.bank), agent.vocabulary)
 
     def learn(self, update: int) -> Mapping[str, float]:
         c = self.config
@@ -140,22 +140,16 @@ class VnlaLearner(SightedLearner):
             loss = reading_loss(self.network.looker, self._lessons, stream(c.seed, "looks", update))
             return {"reading": float(loss.detach()), "gradient": descend(loss, self.optimizer, f"update {update}")}
 
-    def player(self, update: int, bank: FeatureBank) -> Agent:
-        return self._player
-
-    def loss_of(self, episodes: Sequence[Episode], experience: Sequence[VnlaMoment]) -> imitation.BatchLoss:
-        losses = losses_of(experience, self.config.batch)
-        right = torch.cat([m.moves.argmax(-1) == m.move_labels for m in experience])
-        asks, wished = torch.cat([m.asks for m in experience]), torch.cat([m.ask_labels for m in experience])
+    def loss_of(self, episodes: Sequence[Episode], memory: VnlaMemory) -> imitation.BatchLoss:
+        losses, moments = losses_of(memory.moments, self.config.batch), memory.moments
+        right = torch.cat([m.moves.argmax(-1) == m.move_labels for m in moments])
+        asks, wished = torch.cat([m.asks for m in moments]), torch.cat([m.ask_labels for m in moments])
         numbers = {
             "right moves": float(right.float().mean()),
             **imitation.played(episodes, self.training.worlds),
             **imitation.asked(episodes, asks, wished),
         }
         return imitation.BatchLoss(losses, losses[0] + losses[1], numbers)
-
-    def evaluated_agent(self, split: Split) -> Agent:
-        return self.agent.player(split.bank)
 
 
 def losses_of(moments: Sequence[VnlaMoment], episodes: int) -> tuple[Tensor, Tensor]:

@@ -210,11 +210,8 @@ class HelpEnv:
         """The task's budget; a fraction becomes one more request with that probability (docs/sources.md, S46)."""
         if self.task.budget is None:
             return None
-        whole = int(self.task.budget)
-        part = self.task.budget - whole
-        if part > 0 and stream(self.seed, "budget", self.task.id).random() < part:
-            whole += 1
-        return whole
+        whole, part = divmod(self.task.budget, 1)
+        return int(whole) + (part > 0 and stream(self.seed, "budget", self.task.id).random() < part)
 
     def _look(self) -> interface.Observation:
         self._reach = self.moves.at(self.world, self.pose)

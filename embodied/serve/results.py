@@ -294,6 +294,7 @@ def _subgoals(source: Dataset, words: Sequence[Worded]) -> Iterator[Utterance]:
     """Ways of at most HELP_STEPS actions, as the advisor words them, with what people said."""
     teacher = VnlaTeacher()
     for w in words:
-        actions, end = teacher.words(source.place(w.world), Pose(w.path[0], w.turn), (w.path[-1],), HELP_STEPS)
+        plan = teacher.plan(source.place(w.world))
+        actions, end = plan.words(Pose(w.path[0], w.turn), (w.path[-1],), HELP_STEPS)
         if end.node == w.path[-1]:
             yield Utterance(tuple(a for a in actions if a != "stop"), w.text)

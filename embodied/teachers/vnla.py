@@ -195,12 +195,6 @@ class VnlaTeacher:
             self._plans[name] = MonocularPlan(world, self.moves)
         return self._plans[name]
 
-    def words(
-        self, world: interface.Place, pose: interface.Pose, goals: tuple[int, ...], most: int
-    ) -> tuple[tuple[str, ...], interface.Pose]:
-        """Its next `most` actions towards the nearest goal, 'stop' included, and the pose they lead to (4.1)."""
-        return self.plan(world).words(pose, goals, most)
-
     def label(self, situation: interface.Situation, thought: interface.Thought | None = None) -> interface.Label:
         return interface.Label(self.reference(situation), ask_reason(situation, thought) is not None)
 

@@ -53,7 +53,7 @@ class Advisor:
 
     def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
         s = situation
-        words, end = self._teacher.words(s.world, s.pose, s.task.goal_nodes, self._steps)
+        words, end = self._teacher.plan(s.world).words(s.pose, s.task.goal_nodes, self._steps)
         path = s.world.graph.path(s.pose.node, end.node)
         subtask = Subtask("subgoal", end.node, start=s.pose, path=path, words=words)
         return Reply(text=self._language.subgoal(words), subtask=subtask)
