@@ -184,14 +184,8 @@ class Candidates:
         return len(self.bearing)
 
     def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, Candidates)
-            and self.words == other.words
-            and all(
-                np.array_equal(getattr(self, name), getattr(other, name))
-                for name in ("bearing", "slope", "view", "allowed")
-            )
-        )
+        alike = lambda name: np.array_equal(getattr(self, name), getattr(other, name))
+        return isinstance(other, Candidates) and all(map(alike, Candidates.__slots__))
 
 
 # What an agent is asked to do -------------------------------------------------------------------

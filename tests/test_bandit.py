@@ -9,7 +9,7 @@ import pytest
 import sacrebleu
 import torch
 
-from embodied.agents.bandit.ratings import Rater, corpus_bleu, deviation, granular, sentence_bleu, skewed
+from embodied.agents.bandit.ratings import Rater, corpus_bleu, deviation, granular, sentence_bleu
 from embodied.agents.common.session import DivergedError, descend
 from embodied.agents.common.tensors import Decisions, actor_loss, advantages, critic_loss
 from embodied.seeds import stream
@@ -86,8 +86,9 @@ def test_noise_keeps_the_mean_and_has_lambda_times_the_variance(score, strength)
 
 
 def test_skew_by_hand_and_without_variance():
-    assert skewed(0.3, 4) == pytest.approx(0.0081)  # "a score of 0.3 is suppressed to be less than 0.08" (3.1.6.2)
-    assert skewed(0.25, 0.5) == pytest.approx(0.5)
+    # "a score of 0.3 is suppressed to be less than 0.08" (3.1.6.2)
+    assert Rater(skew=4).rate(0.3, rng=stream(0)) == pytest.approx(0.0081)
+    assert Rater(skew=0.5).rate(0.25, rng=stream(0)) == pytest.approx(0.5)
     assert {Rater(skew=2).rate(0.5, rng=stream(i, "x")) for i in range(5)} == {0.25}
 
 

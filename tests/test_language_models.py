@@ -387,7 +387,7 @@ def test_a_model_is_told_the_names_of_what_is_seen_and_where():
 
     world = Furnished(grid_world().house, grid_world().graph)
     o = find_env().reset(dataclasses.replace(find_tasks(1)[0], start=Pose(0, 0)))
-    text = PromptBuilder(oracle_names({"grid": world})).text(o)
+    text = PromptBuilder(oracle_names({"grid": world})).messages(o)[-1]["content"]
     assert "sofa (30 degrees to the left, 2 m)" in text and "key" not in text
 
 

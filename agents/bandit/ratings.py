@@ -32,7 +32,7 @@ class Rater:
         whatever the settings are, so that raters can be compared on the same noise.
         """
         noise = float(rng.standard_normal())
-        rating = skewed(score, self.skew)
+        rating = score**self.skew  # Eq 3.10
         if self.variance:
             rating += math.sqrt(self.variance) * deviation(rating) * noise
         return granular(rating, self.granularity) if self.granularity else rating
@@ -74,11 +74,6 @@ def deviation(score: float) -> float:
     """
     percent = 100 * score
     return max(0.0, 0.64 * percent - 0.02 if percent < 50 else 67.0 - 0.67 * percent) / 100
-
-
-def skewed(score: float, exponent: float) -> float:
-    """Eq 3.10."""
-    return score**exponent
 
 
 ORDERS = (1, 2, 3, 4)

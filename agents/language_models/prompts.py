@@ -221,29 +221,22 @@ class PromptBuilder:
     """One of embodied.agents.language_models.prompts.PICTURE_FORMS."""
     prompt: Prompt = dataclasses.field(default_factory=lambda: agent_prompt())
 
-    def text(self, o: interface.Observation, history: Sequence[str] = ()) -> str:
-        """The observation in words.
+    def messages(self, o: interface.Observation, history: Sequence[str] = ()) -> list[Message]:
+        """The observation in words, with pictures where there are any.
 
         Args:
           history: what was done before, step by step.
         """
-        return self.prompt.template.substitute(self._facts(o, history))
-
-    def messages(self, o: interface.Observation, history: Sequence[str] = ()) -> list[Message]:
-        """The same as messages, with pictures where there are any."""
-        pictures = () if self.panoramas is None else pictures_for(o, self.panoramas, self.pictures)
-        return self.prompt.messages(pictures, **self._facts(o, history))
-
-    def _facts(self, o: interface.Observation, history: Sequence[str]) -> dict[str, str]:
         names = () if self.namer is None else self.namer(o.sight)
-        return {
-            "instruction": o.instruction,
-            "history": " ".join(history[-REMEMBERED_STEPS:]) or "nothing yet",
-            "sees": observation_in_words(o, names),
-            "ways": candidates_in_words(o, names),
-            "actions": ", ".join(actions_by_name(o)),
-            "time": str(o.time),
-        }
+        return self.prompt.messages(
+            () if self.panoramas is None else pictures_for(o, self.panoramas, self.pictures),
+            instruction=o.instruction,
+            history=" ".join(history[-REMEMBERED_STEPS:]) or "nothing yet",
+            sees=observation_in_words(o, names),
+            ways=candidates_in_words(o, names),
+            actions=", ".join(actions_by_name(o)),
+            time=str(o.time),
+        )
 
 
 def agent_prompt(folder: Path | None = None) -> Prompt:

@@ -34,11 +34,10 @@ from embodied.seeds import stream
 from embodied.tasks.goals import with_closed_doors
 
 if TYPE_CHECKING:
-    from embodied.datasets.store import SplitData
+    from embodied.datasets.store import SplitData, TaskSet
 
 
-S = TypeVar("S", bound=Any)
-"""A record with worlds, tasks and make_env."""
+S = TypeVar("S", bound="TaskSet")
 
 
 def agent(kind: str, name: str, worlds: Mapping[str, SeenPlace] | None = None) -> Agent:
