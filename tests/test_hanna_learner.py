@@ -44,7 +44,7 @@ from embodied.agents.hanna.agent import (
     reason_loss,
 )
 from embodied.agents.hanna.policy import for_training
-from embodied.agents.learners.hanna import EVALUATIONS, HANNA_SCALES, RULES, TrainingConfig, ask_above
+from embodied.agents.learners.hanna import EVALUATIONS, HANNA_SCALES, RULES, TrainingConfig
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import Split
 from embodied.assistants.anna import Anna
@@ -195,11 +195,6 @@ def test_sampled_choices_have_their_frequencies_and_never_take_the_impossible():
     assert choose_greedily(p, rng) == choose_at(0)(p, rng) == 2
     sharp = [choose_at(0.5)(np.array([0.25, 0.0, 0.75]), rng) for _ in range(4000)]
     assert abs(sharp.count(2) / 4000 - 0.9) < 0.02 and 1 not in sharp
-
-
-def test_the_threshold_decides_when_the_learned_rule_asks():
-    asks = lambda threshold, p: ask_above(threshold)(p, None, -1, rng=None)
-    assert asks(0.4, 0.45) and not asks(0.5, 0.45) and not asks(0.5, 0.5)
 
 
 def test_every_pass_of_training_takes_every_task_once():

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from embodied.agents.hanna.topological_map import PlaceMap, Trail, matches, opposite, weigh_by_image
-from embodied.agents.learners.hanna import ask_patiently
+from embodied.agents.learners.hanna import ask_above
 from embodied.interface import Ask, Candidates, Intention, Mode, Move, Observation, Sight
 
 LOOKS = np.random.default_rng(0).normal(size=(12, 36, 24)).astype(np.float32)
@@ -122,10 +122,10 @@ def test_who_sees_black_recognises_nothing():
 def test_asking_patiently_waits_after_a_route_and_asks_sooner_before_the_first():
     def asks(probability: float, target: Sight | None, mode: Mode, time_on_task: int) -> bool:
         o = dataclasses.replace(seen(0, [], mode=mode), target=target, time_on_task=time_on_task)
-        return ask_patiently(0.5, first=0.25, on_route=0.7, patience=2)(probability, o, -1, rng=None)
+        return ask_above(0.5, first=0.25, on_route=0.7, patience=2)(probability, o, -1, rng=None)
 
     image = Sight("house", 1)
-    assert asks(0.3, None, Mode.MAIN, 0) and not asks(0.2, None, Mode.MAIN, 9)
+    assert asks(0.3, None, Mode.MAIN, 0) and not asks(0.25, None, Mode.MAIN, 9)
     assert not asks(0.3, image, Mode.MAIN, 5) and asks(0.6, image, Mode.MAIN, 2)
     assert not asks(0.9, image, Mode.MAIN, 1), "it has just left a route"
     assert asks(0.8, image, Mode.SUB, 0), "on a route it may ask at once"

@@ -37,11 +37,10 @@ from embodied.agents.hanna.lstm import LstmNetwork
 from embodied.agents.hanna.network import AgentNetwork, HannaNetwork, Scores
 from embodied.agents.hanna.policy import HannaMemory, HannaPolicy, StepScores, for_training
 from embodied.agents.hanna.topological_map import MapPolicy, PerfectInterpretation
-from embodied.agents.learners.hanna import RULES, HannaEvaluation, TrainingConfig, ask_patiently
+from embodied.agents.learners.hanna import RULES, HannaEvaluation, TrainingConfig, ask_above
 from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.sighted_study import SightedLearner, Split
 from embodied.datasets.store import Dataset
-from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent, Episode, Place, Task, Teacher
 from embodied.teachers.shortest import HannaTeacher
 
@@ -67,7 +66,7 @@ class HannaAgent(SightedAgent):
     def policy(self, bank: FeatureBank) -> MapPolicy:
         check_features(bank.digest, self.about.encoder)
         config, judged = self.about.config, self.about.evaluation
-        learned = ask_patiently(
+        learned = ask_above(
             judged.ask_threshold,
             first=judged.first_ask_threshold,
             on_route=judged.route_ask_threshold,
@@ -133,12 +132,6 @@ class EvenMoves(HannaPolicy):
         logits = torch.zeros(percept.action_mask.shape).masked_fill(~percept.action_mask, -torch.inf)
         logits[:, 0] = -UNWILLING
         return Scores(logits, torch.zeros(len(logits), 2), None), memory.networks
-
-
-def players(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
-    """All rows that an agent gives, beside agents without learning."""
-    without = {name: agent_without_learning("hanna", name) for name in WITHOUT_LEARNING}
-    return {**without, **hanna_policies(agent, bank)}
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from embodied.agents.hanna.agent import HannaAgent, HannaLearner, by_the_text, h
 from embodied.agents.learners.hanna import HannaEvaluation, TrainingConfig
 from embodied.agents.studies.tables import StudyRow, StudyTable, study_tables
 from embodied.agents.vision.sighted_study import TEST_SPLITS as TEST
-from embodied.agents.vision.sighted_study import SightedStudy, TrainingData
+from embodied.agents.vision.sighted_study import SightedStudy
 from embodied.datasets.store import Dataset, SplitData
 from embodied.interface import Agent
 
@@ -38,7 +38,6 @@ class HannaStudy(SightedStudy):
 
     config: TrainingConfig
     evaluation: HannaEvaluation
-    device: str = "cpu"
 
     name, agent_kind, learner = "hanna", HannaAgent, HannaLearner
 
@@ -74,6 +73,3 @@ class HannaStudy(SightedStudy):
             f"docs/sources.md, S36, S161, S162; in {', '.join(PRINTED)} so in the columns 'as shipped' alone, in the "
             "others, beside the printed numbers, the likeliest action is taken."
         )
-
-    def training_data(self) -> TrainingData:
-        return dataclasses.replace(super().training_data(), device=self.device)

@@ -45,15 +45,11 @@ def ask_sampled(probability: float, observation: Observation, last_asked: int, *
     return bool(rng.random() < probability)
 
 
-def ask_above(threshold: float) -> HannaAskRule:
-    """Ask where the network's probability exceeds `threshold`: for evaluation."""
-    return lambda probability, observation, last_asked, *, rng: probability > threshold
-
-
-def ask_patiently(threshold: float, *, first: float, on_route: float, patience: int) -> HannaAskRule:
-    """As `ask_above`, but above `first` while nobody has shown where to go, above `on_route` while following one
-    person's route, from which the next person may send elsewhere, and, once a route is left, not before `patience`
-    moves towards what was shown: who asks again at once is sent back to where it came from."""
+def ask_above(threshold: float, *, first: float, on_route: float, patience: int = 0) -> HannaAskRule:
+    """Ask where the network's probability exceeds `threshold`, or `first` while nobody has shown where to go, or
+    `on_route` while following one person's route, from which the next person may send elsewhere, and, once a route is
+    left, not before `patience` moves towards what was shown: who asks again at once is sent back to where it came
+    from. For evaluation."""
 
     def rule(probability: float, observation: Observation, last_asked: int, *, rng: np.random.Generator) -> bool:
         if observation.target is None:
@@ -65,7 +61,7 @@ def ask_patiently(threshold: float, *, first: float, on_route: float, patience: 
     return rule
 
 
-ask_greedily = ask_above(0.5)
+ask_greedily = ask_above(0.5, first=0.5, on_route=0.5)
 """Ask where the network finds it more likely than not."""
 
 
@@ -178,14 +174,16 @@ class HannaStudyOptions(options.EpisodeStudyOptions, options.Encoded, options.Wi
 
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """Tables 4.3 to 4.5."""
-    from embodied.agents.hanna.agent import WITHOUT_LEARNING, HannaAgent, players
+    from embodied.agents.hanna.agent import WITHOUT_LEARNING, HannaAgent, hanna_policies
     from embodied.agents.vision.sighted_study import evaluation_data
+    from embodied.evaluation.evaluate import agent as agent_without_learning
 
     source, agent = evaluation_data(data, how), HannaAgent.load(file)
+    without = {name: agent_without_learning("hanna", name) for name in WITHOUT_LEARNING}
 
     def of_split(split: str) -> Players:
-        whole, policies = data.split(split, rules=how.rules), players(agent, source.split(split).bank)
-        return Players({name: (whole, policy) for name, policy in policies.items()}, WITHOUT_LEARNING)
+        whole, policies = data.split(split, rules=how.rules), hanna_policies(agent, source.split(split).bank)
+        return Players({name: (whole, p) for name, p in {**without, **policies}.items()}, WITHOUT_LEARNING)
 
     return of_split
 

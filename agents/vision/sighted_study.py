@@ -17,6 +17,7 @@ from embodied.agents.common.settings import EvaluationSettings, ImitationSetting
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.common.weights import load_into
 from embodied.agents.learner import PlaySettings, learner_named
+from embodied.agents.options import training_data
 from embodied.agents.studies.episodes import EpisodeStudy
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.vision.config import SAME_TIME
@@ -25,7 +26,7 @@ from embodied.agents.vision.features import FeatureBank
 from embodied.agents.vision.live import LiveFeatures
 from embodied.agents.vision.run import drawings_of, drawn_world, house_features, pictures_of
 from embodied.assets.cache import default_cache
-from embodied.datasets.store import Dataset, TaskSet, dataset_of
+from embodied.datasets.store import Dataset, TaskSet
 from embodied.envs.base import DoorRule
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import spread, with_doors
@@ -160,6 +161,7 @@ class FeatureStudy(EpisodeStudy):
     pictures: str | None = None
     """Of the pictures that features come from; as the data set holds them where not given."""
     cache: Path = field(default_factory=default_cache)
+    device: str = "cpu"
 
     task_kind: ClassVar[str] = ""
     """Kind of the tasks; the learner's name where not given."""
@@ -189,13 +191,8 @@ class FeatureStudy(EpisodeStudy):
         return {**super().judged(row, split), "pictures": self.training_data().pictures(split)}
 
     def training_data(self) -> TrainingData:
-        """The data set with features.
-
-        Raises:
-          DatasetError: a data set of another kind.
-        """
-        data = dataset_of(self.data, self.task_kind or self.name)
-        return TrainingData(data, load_encoder(self.encoder), self.pictures, cache=self.cache)
+        """The data set with features."""
+        return training_data(self, self.task_kind or self.name, self.device)
 
 
 @dataclass(frozen=True, kw_only=True)
