@@ -70,7 +70,7 @@ class TokenizedCorpora:
             "embodied.agents.bandit.training", stage=stage, settings=settings, corpus=self.digest, **more
         )
 
-    def _begun(self, kind: Callable[[int, int, int], networks.Network], name: str) -> networks.Network:
+    def _begun(self, kind: Callable[..., networks.Network], name: str) -> networks.Network:
         generator = torch.Generator().manual_seed(int(stream(self.config.seed, "begin", name).integers(2**31)))
         return networks.begin(kind(*map(len, self.lexicons), self.config.hidden_size), generator)
 
