@@ -218,7 +218,7 @@ def sun(s: WalkScene) -> Asked:
         of_room: dict[str, list[float]] = {r: [SHADY - 1] for r in s.looked_at}
         for o in windows:
             of_room.get(o.rooms[0], []).append(float(-inward(s.house, o) @ towards[:2] / math.hypot(*towards[:2])))
-        shady = [r for r, cosines in of_room.items() if max(cosines) < SHADY]
+        shady = [r for r, cosines in of_room.items() if len(cosines) > 1 and max(cosines) < SHADY]
         for room in (
             [r for r, cosines in of_room.items() if max(cosines) > SUNNY] if shady and towards[2] > HIGH else ()
         ):
