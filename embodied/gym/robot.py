@@ -232,8 +232,8 @@ class RobotEnv(LiveEnv):
         for name in s.cameras if s.observations else ():
             camera = camera_of(self.body.model, self.body.data, f"robot/{name}")
             pixels = live_pixels(self.world, camera, s.size, s.observations)
-            when_and_where = [round(1000 * x) for x in (self.time, *camera.position)]
-            pixels = photographed(self.world, camera, pixels, s.camera, s.device, self.world.name, name, *when_and_where)
+            moment = [round(1000 * x) for x in (self.time, *camera.position)]
+            pixels = photographed(self.world, camera, pixels, s.camera, s.device, self.world.name, name, *moment)
             seen |= {self._picture_name(name, k): v for k, v in pixels.items()}
         return {**seen, **self._feels(), "instruction": codes_of(self.heard, self.text).copy()}
 
