@@ -28,7 +28,7 @@ from embodied.assets.importing.sh3f import find_packs, open_pack, pack_of
 from embodied.assets.json_file import RecordError
 from embodied.assets.moving_parts import closed, opened, openness_of
 from embodied.assets.people.figures import FIGURES
-from embodied.assets.records import Asset, Finish, ImportRecipe, MeshPart
+from embodied.assets.records import Asset, Finish, ImportRecipe, MeshPart, Size
 from embodied.assets.rows import DATA, check_classes, read_json, read_models
 
 __all__ = ["Catalogue", "load_catalogue"]
@@ -110,9 +110,7 @@ class Catalogue:
         _tell_once()
         return self.only(key for key in self.assets if key not in self._recipes or key in self._own)
 
-    def mesh(
-        self, key: str, size: tuple[float, float, float] | None = None, params: Params = ()
-    ) -> tuple[MeshPart, ...]:
+    def mesh(self, key: str, size: Size | None = None, params: Params = ()) -> tuple[MeshPart, ...]:
         """The parts of an asset at `size` (its own if None); the caller must not change the arrays.
 
         Raises:
@@ -171,7 +169,7 @@ class Catalogue:
         pack = pack_of(model)
         return import_model(pack, dataclasses.replace(recipe, rotation=pack.entries[model].rotation), self.cache)
 
-    def _scale(self, key: str, size: tuple[float, float, float], params: Params) -> tuple[MeshPart, ...]:
+    def _scale(self, key: str, size: Size, params: Params) -> tuple[MeshPart, ...]:
         if openness := openness_of(params):
             return opened(self.assets[key].object_class, self.mesh(key, size, closed(params)), openness)
         if key not in self._recipes:

@@ -28,6 +28,7 @@ from embodied.light.pages.colours import ColourMaps
 from embodied.light.pages.cover import rasterise
 from embodied.light.pages.tone import Exposure, develop
 from embodied.light.pages.unwrap import areas_of
+from embodied.light.settings import LightSettings
 from embodied.light.tracing import luxels, radiosity
 from embodied.light.tracing.emitters import lamps_of, portals_of
 from embodied.light.tracing.sky import Outdoors, paint, sun_direction, sun_height
@@ -54,7 +55,7 @@ def closed_box(size: float, finish: Finish, lights: tuple[Light, ...] = ()):
     mesh = box_mesh((0, 0, 0), (size, size, size), finish.color)
     inward = dataclasses.replace(mesh, faces=mesh.faces[:, ::-1], normals=-mesh.normals, finish=finish)
     part = Part("box_1/wall_0", "wall", "box_1", inward, "box")
-    atlas = atlas_of(things_of([part], density=8.0, budget=100, cache=None))
+    atlas = atlas_of(things_of([part], LightSettings(density=8.0, budget=100), None))
     lamps = lamps_of(house, atlas)
     lux = luxels.with_glow(luxels.luxels_of(atlas, ColourMaps()), house, atlas, lamps)
     space = radiosity.with_env(radiosity.space_of(atlas, lux.texels), DARK.picture)
@@ -90,7 +91,9 @@ def test_sky_through_a_hole_matches_the_form_factor_of_a_rectangle():
     portal = Portal("p", "r", np.array([-w / 2, -w / 2, h]), np.array([0.0, w, 0.0]), np.array([w, 0.0, 0.0]))
     assert portal.normal == pytest.approx([0, 0, -1])
     far_below = box_mesh((-1, -1, -9), (1, 1, -8), (0.5, 0.5, 0.5, 1.0))
-    atlas = atlas_of(things_of([Part("a/b", "wall", "a", far_below, "x")], density=1.0, budget=100, cache=None))
+    atlas = atlas_of(
+        things_of([Part("a/b", "wall", "a", far_below, "x")], LightSettings(density=1.0, budget=100), None)
+    )
     space = radiosity.space_of(atlas, [rasterise(p, 1) for p in atlas.pages])
     space = radiosity.with_env(space, np.full((64, 128, 3), 3.0, np.float32))
     up = np.tile([[0.0, 0.0, 1.0]], (64, 1))
@@ -119,13 +122,15 @@ def test_a_glint_that_reaches_no_luxel_adds_nothing():
 
 def test_noise_goes_and_an_edge_stays():
     mesh = box_mesh((0, 0, 0), (2.0, 2.0, 2.0), (0.5, 0.5, 0.5, 1.0))
-    atlas = atlas_of(things_of([Part("a/wall_0", "wall", "a", mesh, "a")], density=20.0, budget=100, cache=None))
+    atlas = atlas_of(
+        things_of([Part("a/wall_0", "wall", "a", mesh, "a")], LightSettings(density=20.0, budget=100), None)
+    )
     lux = luxels.luxels_of(atlas, ColourMaps())
     left, all_ = lux.position[:, 0] < 1.0, np.ones(len(lux.area), bool)
     clean = np.where(left, 1.0, 4.0)[:, None].repeat(3, 1).astype(np.float32)
     noise = np.random.default_rng(0).normal(0, 0.1, (len(clean), 1)).astype(np.float32)
-    options = {"steps": (1, 2, 4), "likeness": (0.12,) * 3, "variance": np.square(0.1 * clean[:, 0])}
-    out = smooth_pages(clean * (1 + noise), Grid(atlas, lux.texels), all_, **options)
+    variance, likeness = np.square(0.1 * clean[:, 0]), (0.12, 0.12, 0.12)
+    out = smooth_pages(clean * (1 + noise), Grid(atlas, lux.texels), all_, variance=variance, likeness=likeness)
     assert np.abs(out / clean - 1).mean() < 0.4 * np.abs(noise).mean()
     assert out[left].max() < 1.6 and out[~left].min() > 3.0
 
@@ -268,7 +273,7 @@ def test_skin_of_people_has_finer_texels_than_cloth_and_what_is_inside_them_no_l
         Part("person_1", "object", "a", mesh, f"people/anna#{i}")
         for i, mesh in enumerate(posed(anna, POSES["waiting"], 2))
     ]
-    atlas = atlas_of(things_of(parts, density=20.0, budget=800.0, sharpness=0.45, cache=tmp_path))
+    atlas = atlas_of(things_of(parts, LightSettings(density=20.0, budget=800.0, sharpness=0.45), tmp_path))
     fine = {}
     for page in atlas.pages:
         on_page = areas_of(np.pad(page.luxels * page.fineness, ((0, 0), (0, 0), (0, 1)))).sum()
@@ -278,6 +283,6 @@ def test_skin_of_people_has_finer_texels_than_cloth_and_what_is_inside_them_no_l
     boxes = [box_mesh((x, x, x), (1 - x, 1 - x, 1 + x), (0.5, 0.5, 0.5, 1.0)) for x in (0.0, 0.3)]
     for key, kept in (("people/anna", False), ("built/boxes", True)):
         nested = [Part("boxes", "object", "a", mesh, f"{key}#{i}") for i, mesh in enumerate(boxes)]
-        atlas = atlas_of(things_of(nested, density=20.0, budget=800.0, cache=tmp_path))
+        atlas = atlas_of(things_of(nested, LightSettings(density=20.0, budget=800.0), tmp_path))
         at = np.abs(luxels.luxels_of(atlas, ColourMaps()).position - 0.5)
         assert (at.max(1) < 0.45).any() == kept and (at[:, 2] > 0.7).any(), key

@@ -141,13 +141,7 @@ def surface_of(
       cache: the folder of its light, which keeps unwrapped furniture.
       lamps: the lamps of `house` that are on.
     """
-    things = things_of(
-        [p for p in parts if len(p.mesh.faces)],
-        density=settings.density,
-        budget=settings.budget,
-        cache=cache,
-        sharpness=settings.sharpness,
-    )
+    things = things_of([p for p in parts if len(p.mesh.faces)], settings, cache)
     if not things:
         return None
     atlas, maps = atlas_of(things), ColourMaps()

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from embodied.render.camera import Pixels
+
 LEVELS = 5
 """Smaller copies, each half as large as the last."""
 BLOCK = 2**LEVELS
@@ -45,9 +47,7 @@ def packed(pages: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return picture, corners + GUTTER
 
 
-def repaint(
-    picture: np.ndarray, place: np.ndarray, shape: tuple[int, int], at: tuple[int, int], part: np.ndarray
-) -> None:
+def repaint(picture: np.ndarray, place: np.ndarray, shape: Pixels, at: tuple[int, int], part: np.ndarray) -> None:
     """Change part of a page in what `packed` returned, and its copies.
 
     Args:

@@ -19,6 +19,8 @@ NEAR_PLANE, FAR_PLANE = 0.03, 200.0
 """Nothing nearer or farther is drawn, metres."""
 Position = Sequence[float] | np.ndarray
 """x, y, z, metres."""
+Pixels = tuple[int, int]
+"""Height and width of a picture."""
 Planes = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Pixels of one picture or of several: rgb, depth and ids, as `View` has them."""
 
@@ -77,11 +79,7 @@ def _point(position: Position) -> tuple[float, float, float]:
 
 
 def pixel_rays(
-    camera: Camera,
-    size: tuple[int, int],
-    pixels: np.ndarray | None = None,
-    step: int = 1,
-    aside: np.ndarray | None = None,
+    camera: Camera, size: Pixels, pixels: np.ndarray | None = None, step: int = 1, aside: np.ndarray | None = None
 ) -> np.ndarray:
     """(n, 3) float32 unit rays through pixels (flat positions; all without) of a picture of `size`.
 
@@ -104,9 +102,7 @@ def pixel_rays(
 
 
 @functools.lru_cache(maxsize=24)
-def _all_rays(
-    forward: tuple[float, ...], up: tuple[float, ...], vfov: float, size: tuple[int, int], step: int
-) -> np.ndarray:
+def _all_rays(forward: tuple[float, ...], up: tuple[float, ...], vfov: float, size: Pixels, step: int) -> np.ndarray:
     """Kept, as panoramas look along the same six directions from everywhere."""
     ahead, above = np.asarray(forward, np.float32), np.asarray(up, np.float32)
     x, y = _across(size, step, math.tan(vfov / 2))
@@ -117,7 +113,7 @@ def _all_rays(
     return rays
 
 
-def _across(size: tuple[int, int], step: int, tall: float) -> tuple[np.ndarray, np.ndarray]:
+def _across(size: Pixels, step: int, tall: float) -> tuple[np.ndarray, np.ndarray]:
     """How far to the right and up of its middle the columns and rows of a picture are, a metre ahead."""
     h, w = size
     x = ((np.arange(0, w, step) + step / 2) / w * 2 - 1) * tall * w / h

@@ -19,7 +19,7 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.render import visibility
-from embodied.render.camera import Camera, View, camera_at, face_cameras
+from embodied.render.camera import Camera, Pixels, Position, View, camera_at, face_cameras
 from embodied.render.geoms import Geoms
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import check_size
@@ -178,12 +178,7 @@ class Renderer:
         self.house = house
 
     def view(
-        self,
-        position: Sequence[float] | np.ndarray,
-        yaw: float,
-        pitch: float = 0.0,
-        vfov: float = math.pi / 3,
-        size: tuple[int, int] = (480, 640),
+        self, position: Position, yaw: float, pitch: float = 0.0, vfov: float = math.pi / 3, size: Pixels = (480, 640)
     ) -> View:
         """The picture from `position` (x, y, z) along (yaw, pitch).
 
@@ -194,7 +189,7 @@ class Renderer:
         return self.through(camera_at(position, yaw, pitch, vfov), size)
 
     @gl.drawing()
-    def through(self, camera: Camera, size: tuple[int, int]) -> View:
+    def through(self, camera: Camera, size: Pixels) -> View:
         """The picture of (height, width) that `camera` takes.
 
         Where the CPU draws a lit house, an id is of a point up to a third of a pixel beside the middle: it tells at
@@ -205,26 +200,26 @@ class Renderer:
         return View(self._overlaid(averaged(picture, size), camera), cv2.flip(depth, 0), cv2.flip(ids, 0))
 
     @gl.drawing()
-    def rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
+    def rgb(self, camera: Camera, size: Pixels) -> np.ndarray:
         """(h, w, 3) uint8: colours alone."""
         picture = self._open().rgb(camera, self._drawn_size(size), np.flatnonzero(self._in_view(camera, size)))
         return self._overlaid(averaged(picture, size), camera)
 
     @gl.drawing()
-    def depth_and_ids(self, camera: Camera, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    def depth_and_ids(self, camera: Camera, size: Pixels) -> tuple[np.ndarray, np.ndarray]:
         """(h, w) float32 metres along the optical axis and (h, w) int32, without the colours."""
         depth, ids = self._open().depth_and_ids(camera, size, np.flatnonzero(self._in_view(camera, size)))
         return cv2.flip(depth, 0), cv2.flip(ids, 0)
 
     @gl.drawing()
-    def panorama(self, position: Sequence[float] | np.ndarray, size: int | None = None) -> Panorama:
+    def panorama(self, position: Position, size: int | None = None) -> Panorama:
         """Six cube faces of rgb, depth and ids around `position` (x, y, z)."""
         s = size or self.size
         rgb = np.stack([self.rgb(camera, (s, s)) for camera in face_cameras(position)])
         return Panorama(rgb, *self.seen(position, s))
 
     @gl.drawing()
-    def seen(self, position: Sequence[float] | np.ndarray, size: int = 64) -> tuple[np.ndarray, np.ndarray]:
+    def seen(self, position: Position, size: int = 64) -> tuple[np.ndarray, np.ndarray]:
         """Depth and ids of the six faces without the colours: (6, s, s) float32 metres, (6, s, s) int32."""
         faces = [self.depth_and_ids(camera, (size, size)) for camera in face_cameras(position)]
         return np.stack([depth for depth, _ in faces]), np.stack([ids for _, ids in faces])
@@ -248,7 +243,7 @@ class Renderer:
             raise RuntimeError("the renderer is closed; make a new one")
         return self._drawing
 
-    def _in_view(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
+    def _in_view(self, camera: Camera, size: Pixels) -> np.ndarray:
         """(ngeom,) bool: drawn and maybe seen: through doors and windows, with its box in the field of view."""
         drawing = self._open()
         forward, up = np.array(camera.forward), np.array(camera.up)
@@ -274,7 +269,7 @@ class Renderer:
         mask[geoms[spans.within(sectors, geoms)]] = True
         return mask & framed
 
-    def _drawn_size(self, size: tuple[int, int]) -> tuple[int, int]:
+    def _drawn_size(self, size: Pixels) -> tuple[int, int]:
         """(height, width) at which colours of a picture of `size` are drawn."""
         return drawn_size(size) if self._software else size
 

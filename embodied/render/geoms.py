@@ -17,7 +17,7 @@ import numpy as np
 
 from embodied.geometry import rotation
 from embodied.house.house import House
-from embodied.render.camera import FAR_PLANE, NEAR_PLANE, Camera, Planes
+from embodied.render.camera import FAR_PLANE, NEAR_PLANE, Camera, Pixels, Planes
 from embodied.render.panorama import face_rays, ray_stretch
 from embodied.scene.model import VISUAL, Scene, compile_scene
 
@@ -74,7 +74,7 @@ class Geoms:
         mujoco.mj_kinematics(model, self._data)
         self.middles, self.reaches = world_boxes(model, self._data)
 
-    def rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> np.ndarray:
+    def rgb(self, camera: Camera, size: Pixels, chosen: np.ndarray) -> np.ndarray:
         """(h, w, 3) uint8, bottom row first, of the geoms `chosen` (k,)."""
         self._choose(camera, size, chosen)
         rect, rgb = mujoco.MjrRect(0, 0, size[1], size[0]), np.empty((*size, 3), np.uint8)
@@ -82,7 +82,7 @@ class Geoms:
         mujoco.mjr_readPixels(rgb, None, rect, self._mjr)
         return rgb
 
-    def depth_and_ids(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def depth_and_ids(self, camera: Camera, size: Pixels, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(h, w) float32 metres along the optical axis and (h, w) int32, bottom row first; as in `rgb`."""
         self._choose(camera, size, chosen)
         flags = self._drawn.flags
@@ -101,7 +101,7 @@ class Geoms:
         depth[(reversed_z <= 0) | (ids == 0)] = np.inf  # a painted sky is no thing
         return depth, ids
 
-    def view(self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray) -> Planes:
+    def view(self, camera: Camera, size: Pixels, drawn: Pixels, chosen: np.ndarray) -> Planes:
         """`rgb` of the size `drawn`, and `depth_and_ids` of `size`."""
         return self.rgb(camera, drawn, chosen), *self.depth_and_ids(camera, size, chosen)
 
@@ -109,7 +109,7 @@ class Geoms:
         """Free what lies on the graphics side."""
         self._mjr.free()
 
-    def _choose(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> None:
+    def _choose(self, camera: Camera, size: Pixels, chosen: np.ndarray) -> None:
         """Prepare OpenGL and the list of geoms to draw."""
         mujoco.mjr_restoreBuffer(self._mjr)
         if any(n > b for n, b in zip(size, self._buffer, strict=True)):
@@ -124,7 +124,7 @@ class Geoms:
         model.geom_group[:] = self._groups
         self._aim(camera, size)
 
-    def _aim(self, camera: Camera, size: tuple[int, int]) -> None:
+    def _aim(self, camera: Camera, size: Pixels) -> None:
         """Write `camera` into both eyes of the scene."""
         top = NEAR_PLANE * math.tan(camera.vfov / 2)
         for eye in self._drawn.camera:

@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
+from embodied.render.camera import Pixels, Planes
 from embodied.render.sampling import AXES, Rays, locate
 
 VFOV36 = math.radians(60.0)
@@ -61,9 +62,7 @@ class Panorama:
         """Side of a face, pixels."""
         return self.rgb.shape[1]
 
-    def view(
-        self, yaw: float, pitch: float = 0.0, vfov: float = VFOV36, size: tuple[int, int] = (480, 640)
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def view(self, yaw: float, pitch: float = 0.0, vfov: float = VFOV36, size: Pixels = (480, 640)) -> Planes:
         """A perspective picture along (yaw, pitch): rgb, depth along its optical axis, ids.
 
         Args:
@@ -78,9 +77,7 @@ class Panorama:
         grid = perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *checked(vfov, size))
         return self.through(grid, "rgb"), self.through(grid, "depth"), self.through(grid, "ids")
 
-    def view_rgb(
-        self, yaw: float, pitch: float = 0.0, vfov: float = VFOV36, size: tuple[int, int] = (480, 640)
-    ) -> np.ndarray:
+    def view_rgb(self, yaw: float, pitch: float = 0.0, vfov: float = VFOV36, size: Pixels = (480, 640)) -> np.ndarray:
         """The colours of `view` alone."""
         grid = perspective_grid(self.size, float(yaw), float(pitch), float(vfov), *checked(vfov, size))
         return self.through(grid, "rgb")

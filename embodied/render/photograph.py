@@ -197,9 +197,7 @@ def bloomed(light: np.ndarray, veil: float) -> np.ndarray:
     return out
 
 
-def noisy(
-    light: np.ndarray, gain: float, traits: CameraTraits, dark: float = 1.0, *, rng: np.random.Generator
-) -> np.ndarray:
+def noisy(light: np.ndarray, gain: float, traits: CameraTraits, dark: float, *, rng: np.random.Generator) -> np.ndarray:
     """Light with the noise of photons and of reading them out, before the gain is applied to both.
 
     Deviation sqrt(a x + b), the Poissonian-Gaussian model of Foi et al. 2008 (eq. 2 and 3): with N electrons at full

@@ -18,7 +18,7 @@ import numpy as np
 from OpenGL import GL
 
 from embodied.render import atlas, coarser, shaders
-from embodied.render.camera import FAR_PLANE, NEAR_PLANE, Camera, Planes
+from embodied.render.camera import FAR_PLANE, NEAR_PLANE, Camera, Pixels, Planes
 from embodied.render.supersampling import nearest, step_of
 from embodied.scene.lit_pages import LitMesh
 
@@ -94,7 +94,7 @@ class Raster:
         GL.glUseProgram(0)
         self._size = (0, 0)
 
-    def rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> np.ndarray:
+    def rgb(self, camera: Camera, size: Pixels, chosen: np.ndarray) -> np.ndarray:
         """(h, w, 4) uint8, bottom row first.
 
         Args:
@@ -105,7 +105,7 @@ class Raster:
         self._end()
         return picture
 
-    def depth_and_ids(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def depth_and_ids(self, camera: Camera, size: Pixels, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(h, w) float32 metres along the optical axis, inf where no owner is, and (h, w) int32, bottom row first; as
         in `rgb`."""
         self._begin("numbers", size)
@@ -114,7 +114,7 @@ class Raster:
         self._end()
         return _metres(near), ids
 
-    def view(self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray) -> Planes:
+    def view(self, camera: Camera, size: Pixels, drawn: Pixels, chosen: np.ndarray) -> Planes:
         """`rgb` of the size `drawn`, and `depth_and_ids` of `size`; from one pass where the pixels come out even.
 
         Then a pixel has the id of the nearest of the larger ones, whose middle is at most a third of a pixel from its
@@ -168,14 +168,14 @@ class Raster:
         for program, _ in self._programs.values():
             GL.glDeleteProgram(program)
 
-    def _sorted(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _sorted(self, camera: Camera, size: Pixels, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """`_ranges` of what is opaque, the nearest first, and of what shines through, the farthest first."""
         order = chosen[((self.middles[chosen] - np.array(camera.position)) ** 2).sum(1).argsort()]
         clear = self._is_clear[order]
         ranges = self._ranges(camera, size, order)
         return ranges[~clear], ranges[clear][::-1]
 
-    def _ranges(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> np.ndarray:
+    def _ranges(self, camera: Camera, size: Pixels, chosen: np.ndarray) -> np.ndarray:
         """(k, 2) first and number of the triangles to draw of the meshes `chosen` (k,)."""
         forward = np.array(camera.forward)
         near = (self.middles[chosen] - np.array(camera.position)) @ forward - self.reaches[chosen] @ np.abs(forward)
@@ -185,9 +185,7 @@ class Raster:
         level = len(fits) - 1 - fits[::-1].argmax(0)
         return np.stack([self._starts[level, chosen], counts[level, np.arange(len(chosen))]], axis=1)
 
-    def _coloured(
-        self, frame: str, camera: Camera, size: tuple[int, int], solid: np.ndarray, clear: np.ndarray
-    ) -> np.ndarray:
+    def _coloured(self, frame: str, camera: Camera, size: Pixels, solid: np.ndarray, clear: np.ndarray) -> np.ndarray:
         """(h, w, 4) uint8, bottom row first, of what `_sorted` returned; what else is in `frame` is of what is
         solid."""
         matrix = self._matrix(camera, size)
@@ -211,13 +209,13 @@ class Raster:
         GL.glReadPixels(*here, picture)
         return picture
 
-    def _matrix(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
+    def _matrix(self, camera: Camera, size: Pixels) -> np.ndarray:
         """`projection` to the depths that this OpenGL takes at present; MuJoCo leaves it with 0 to 1."""
         mode = np.ravel(GL.glGetIntegerv(GL.GL_CLIP_DEPTH_MODE))[0]
         lowest = 0.0 if mode == GL.GL_ZERO_TO_ONE else -1.0
         return projection(camera, size, lowest)
 
-    def _begin(self, frame: str, size: tuple[int, int]) -> None:
+    def _begin(self, frame: str, size: Pixels) -> None:
         if any(n > s for n, s in zip(size, self._size, strict=True)):
             self._size = max(size[0], self._size[0]), max(size[1], self._size[1])
             self._make_frames()
@@ -278,7 +276,7 @@ def able() -> bool:
     return (GL.glGetIntegerv(GL.GL_MAJOR_VERSION), GL.glGetIntegerv(GL.GL_MINOR_VERSION)) >= VERSION
 
 
-def projection(camera: Camera, size: tuple[int, int], lowest: float) -> np.ndarray:
+def projection(camera: Camera, size: Pixels, lowest: float) -> np.ndarray:
     """(4, 4) float32 from metres of the world to clip space, of depth 1 at NEAR_PLANE and `lowest` at FAR_PLANE."""
     forward, up = np.array(camera.forward), np.array(camera.up)
     tall = math.tan(camera.vfov / 2)
@@ -343,7 +341,7 @@ def _upload_corners(array: int, buffers: Sequence[int], corners: np.ndarray) -> 
     GL.glBindBuffer(GL.GL_ARRAY_BUFFER, 0)
 
 
-def _make_texture(texture: int, size: tuple[int, int], picture: np.ndarray | None) -> None:
+def _make_texture(texture: int, size: Pixels, picture: np.ndarray | None) -> None:
     """(h, w, 4) uint8 without smaller copies."""
     GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
     form = GL.GL_RGBA
@@ -353,7 +351,7 @@ def _make_texture(texture: int, size: tuple[int, int], picture: np.ndarray | Non
     GL.glBindTexture(GL.GL_TEXTURE_2D, 0)
 
 
-def _read(frame: str, name: str, size: tuple[int, int]) -> np.ndarray:
+def _read(frame: str, name: str, size: Pixels) -> np.ndarray:
     """(h, w) of a picture of the bound frame."""
     _, kind, number, dtype, _ = SHADER_OUTPUTS[name]
     out = np.empty(size, dtype)

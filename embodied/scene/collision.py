@@ -15,7 +15,7 @@ from scipy import ndimage
 from embodied.assets.cache import atomic_path, digest
 from embodied.assets.closure import code_digest
 from embodied.assets.json_file import parse_file
-from embodied.assets.records import Asset, MeshPart
+from embodied.assets.records import Asset, MeshPart, Size
 from embodied.geometry import r2
 from embodied.house.house import House, Room
 from embodied.house.shapes import opening_of
@@ -71,9 +71,7 @@ class CollisionBox:
     """Turn about its own x axis before that, radians."""
 
 
-def kept_boxes(
-    asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float], cache: Path
-) -> tuple[CollisionBox, ...]:
+def kept_boxes(asset: Asset, parts: Sequence[MeshPart], size: Size, cache: Path) -> tuple[CollisionBox, ...]:
     """`object_boxes`, kept on disk under what they depend on, code included; nonsense in a file is made again."""
     surfaces = [dataclasses.astuple(s) for s in asset.surfaces]
     meshes = [array.tobytes() for p in parts for array in (p.vertices, p.faces)]
@@ -91,7 +89,7 @@ def kept_boxes(
     return boxes
 
 
-def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float]) -> tuple[CollisionBox, ...]:
+def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: Size) -> tuple[CollisionBox, ...]:
     """Boxes that cover an object and leave the space under tables and over its support surfaces free.
 
     Args:

@@ -19,38 +19,31 @@ KERNEL = (0.0625, 0.25, 0.375, 0.25, 0.0625)
 
 
 def smooth_pages(
-    e: np.ndarray,
-    grid: Grid,
-    good: np.ndarray,
-    *,
-    steps: Sequence[int] = (1, 2, 4, 8, 16),
-    likeness: Sequence[float] = (0.15, 0.12, 0.1, 0.1, 0.1),
-    variance: np.ndarray | None = None,
+    e: np.ndarray, grid: Grid, good: np.ndarray, *, variance: np.ndarray, likeness: Sequence[float]
 ) -> np.ndarray:
     """A-trous smoothing along surfaces.
 
     Args:
       e: (n, 3) float32.
       good: (n,) bool, luxels whose value counts.
-      likeness: for each step, the standard deviation of log brightness that still counts as the
+      variance: (n,) of each luxel's brightness; likeness is widened by the noise that is left, as in SVGF (Schied et
+        al. 2017, sec. 4.4): noise goes, contact shadows stay.
+      likeness: for steps of 1, 2, 4, ... luxels, the standard deviation of log brightness that still counts as the
         same light.
-      variance: (n,) of each luxel's brightness; where given, likeness is widened by the noise that is
-        left, as in SVGF (Schied et al. 2017, sec. 4.4): noise goes, contact shadows stay.
     """
     if not len(e):
         return e
     trust = np.where(good, 1.0, 1e-4).astype(np.float32)[:, None]
-    out, noise, floor = np.array(e, np.float32), np.zeros(len(e), np.float32), np.zeros(len(e), np.float32)
-    if variance is not None:
-        noise, floor = _relative_noise(grid, out, variance)
-    for step, like in zip(steps, likeness):
+    out = np.array(e, np.float32)
+    noise, floor = _relative_noise(grid, out, variance)
+    for k, like in enumerate(likeness):
         values = floats(np.concatenate([out, trust], axis=1))  # one gather of four is faster than two
         own, own_noise = mi.Color3f(vector(out)), floats(noise)
         least = floats(floor) + 1e-4
         shade = dr.log(_brightness(own) + least)
         total, weight, squares = mi.Color3f(0.0), mi.Float(0.0), mi.Float(0.0)
         tight = 1 / (opaque_float(like**2) + dr.square(NOISES * own_noise))
-        for i, j, q, inside in grid.around(step):
+        for i, j, q, inside in grid.around(2**k):
             *colour, trusted = dr.gather(mi.Vector4f, values, q, inside)
             other = mi.Color3f(*colour)
             far = dr.log(_brightness(other) + least) - shade

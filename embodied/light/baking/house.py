@@ -218,14 +218,8 @@ class BakeContext:
         every = [p for p in parts if len(p.mesh.faces)]
         self.maps, self._house, self._cache, self._sharpness = ColourMaps(), house, cache, settings.sharpness
         self._outer = [p for p in every if p.kind == "outdoor"]
-        things = things_of(
-            [p for p in every if p.kind != "outdoor"],
-            density=settings.density,
-            budget=settings.budget,
-            sharpness=settings.sharpness,
-            cache=cache,
-            progress=lambda i, n: progress("unwrapping", i / n),
-        )
+        indoors = [p for p in every if p.kind != "outdoor"]
+        things = things_of(indoors, settings, cache, lambda i, n: progress("unwrapping", i / n))
         self.unwrap_seconds = round(time.process_time() - start, 2)
         free_memory()
         self.atlas = atlas_of(coarsened(things, settings.texels))

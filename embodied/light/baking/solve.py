@@ -314,9 +314,8 @@ def solve(inputs: BakeInput, tell: Callable[[str, float], None] = lambda stage, 
     free_memory()
     tell("smoothing", 0.0)
     good, grid = bounced.good, get_or_compute(inputs.memory, "grid", lambda: denoise.Grid(atlas, lux.texels))
-    smooth = functools.partial(denoise.smooth_pages, grid=grid, good=good)
-    indirect = smooth(bounced.e, steps=(1, 2, 4), likeness=(0.08, 0.08, 0.08), variance=bounced.variance)
+    indirect = denoise.smooth_pages(bounced.e, grid, good, variance=bounced.variance, likeness=(0.08, 0.08, 0.08))
     grain = denoise.spatial_variance(direct, grid) * 0.8
-    direct = smooth(direct, steps=(1, 2), likeness=(0.3, 0.2), variance=grain)
+    direct = denoise.smooth_pages(direct, grid, good, variance=grain, likeness=(0.3, 0.2))
     free_memory()
     return Radiosity(direct, share, patches, indirect + outer_light(inputs), good | ~lux.shell)

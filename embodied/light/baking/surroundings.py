@@ -1,7 +1,6 @@
 """The view through windows: a dome with the painted outdoors, and the house's own outer parts in daylight."""
 
 import dataclasses
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from embodied.light.pages.colours import ColourMaps, albedo
 from embodied.light.pages.cover import Cover, Texels, cover, rasterise, sheets_of
 from embodied.light.pages.tone import Exposure, display
 from embodied.light.pages.unwrap import SPARSEST, areas_of
+from embodied.light.settings import LightSettings
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.radiosity import LIFT, Together, points_of, small_sky
 from embodied.light.tracing.sky import Outdoors
@@ -62,9 +62,9 @@ def outside_of(
     area = _area(near) + COARSER**2 * _area(far)
     density = float(min(14.0, np.sqrt(LUXELS * sharpness**2 / max(area, 1.0))))
     budget = round(min(1500.0, (density / SPARSEST) ** 2))  # of trees and hedges, no finer than the rest
-    unfold = functools.partial(things_of, budget=budget, cache=cache, finest=2)
-    things = unfold([_flat(p) for p in near], density=density)
-    atlas = atlas_of(things + unfold([_flat(p) for p in far], density=COARSER * density))
+    unfold = lambda some, much: things_of([_flat(p) for p in some], LightSettings(density=much, budget=budget), cache)
+    things = unfold(near, density) + unfold(far, COARSER * density)
+    atlas = atlas_of([dataclasses.replace(t, fineness=min(t.fineness, 2)) for t in things])
     sheets = sheets_of(atlas.pages)
     covers = tuple(cover(p, p.fineness, s) for p, s in zip(atlas.pages, sheets))
     return Outside(

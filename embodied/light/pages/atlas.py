@@ -13,9 +13,12 @@ import numpy as np
 from embodied.assets.records import DETAILS, Finish, MeshPart
 from embodied.geometry import rotation
 from embodied.light.pages.unwrap import Unwrapped, areas_of, cached_model, pack, told_apart, unwrap_planes
+from embodied.light.settings import LightSettings
 from embodied.scene.lit_pages import LitMesh
 
 SHELL = ("wall", "floor", "ceiling")
+FINEST = 8
+"""Texels per luxel at most."""
 
 
 PRINT_AREA, PRINT_THICKNESS = 1.5, 0.06
@@ -79,23 +82,12 @@ class Atlas:
 
 
 def things_of(
-    parts: Sequence,
-    *,
-    density: float,
-    budget: float,
-    cache: Path,
-    finest: int = 8,
-    sharpness: float = 1.0,
-    progress: Callable[[int, int], None] = lambda i, n: None,
+    parts: Sequence, settings: LightSettings, cache: Path, progress: Callable[[int, int], None] = lambda i, n: None
 ) -> tuple[UnwrappedThing, ...]:
     """Group parts by owner and unwrap each; furniture from the cache.
 
     Args:
       parts: embodied.scene.house_meshes.Part of one house; kind 'outdoor' must be left out.
-      density: luxels per metre of walls, floors and ceilings.
-      budget: luxels per piece of furniture.
-      finest: texels per luxel at most.
-      sharpness: of patterns, 1 to look sharp from nearby.
     """
     groups: dict[tuple, list] = {}
     for p in parts:
@@ -107,14 +99,15 @@ def things_of(
         meshes: list[MeshPart] = [p.mesh for p in thing_parts]
         person = thing_parts[0].mesh_key.startswith("people/")
         if kind in SHELL:
-            flat = unwrap_planes(meshes, density)
+            flat = unwrap_planes(meshes, settings.density)
         else:
-            luxels = 2 * budget if person and not face else budget
+            luxels = settings.budget * (2 if person and not face else 1)
             flat = cached_model(meshes, luxels, cache, trusted=kind == "opening", alone=kind == "outdoor")
         if len(flat.corners):
             flat = _placed(flat, position, yaw)
             finishes = tuple(m.finish for m in meshes)
-            fineness = min(finest, _fineness(kind, flat, finishes, density, 3 * sharpness if face else sharpness))
+            sharpness = settings.sharpness * (3 if face else 1)
+            fineness = min(FINEST, _fineness(kind, flat, finishes, settings.density, sharpness))
             things.append(UnwrappedThing(owner, room, kind, flat, finishes, fineness, glass, person))
     return tuple(things)
 

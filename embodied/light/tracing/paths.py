@@ -190,21 +190,14 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
 
 
 def irradiance(
-    space: Space,
-    lights: Lights,
-    surfaces: Surfaces,
-    p: Points,
-    *,
-    rng: np.random.Generator,
-    deepest: int = MOST_BOUNCES,
-    active: Array = True,
+    space: Space, lights: Lights, surfaces: Surfaces, p: Points, *, rng: np.random.Generator, active: Array = True
 ) -> Array:
     """e (a Color3f) at points, 0 where not `active`, from all lights and any number of diffuse bounces: a path each."""
     sums = np.zeros((p.n, 3), np.float32)
     of = np.flatnonzero(np.broadcast_to(np.asarray(active), p.n))  # the point that each path began at
     p = radiosity.only(p, of)
     total, throughput, alive = mi.Color3f(0.0), mi.Color3f(1.0), mi.Bool(True)
-    for depth in range(deepest if len(of) else 0):
+    for depth in range(MOST_BOUNCES if len(of) else 0):
         turn = rng.random((2, p.n), np.float32)
         p = replace(p, turn0=floats(turn[0]), turn1=floats(turn[1]))
         total = total + dr.select(alive, throughput * direct(space, lights, p, rng=rng), 0.0)

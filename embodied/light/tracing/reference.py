@@ -16,6 +16,7 @@ from embodied.light.pages.tone import develop
 from embodied.light.tracing import paths, radiosity
 from embodied.light.tracing.radiosity import Points
 from embodied.light.tracing.scene import Hit, Panes, backdrop_at, look, picture_at, through, world_of
+from embodied.render.camera import Pixels, Planes
 from embodied.render.film import light_of, shown_of
 from embodied.render.panorama import Panorama
 from embodied.render.sampling import FACES
@@ -38,6 +39,8 @@ SPIKE = 0.4
 """Standard error of a pixel's brightness over its mean above which it must not outshine its neighbours."""
 LANES = 2**19
 """Rays traced at once: to set a wave of them up costs as much for few as for many."""
+Look = tuple[Triple, Triple]
+"""Forward and up of a camera."""
 
 
 class Tracer:
@@ -68,21 +71,16 @@ class Tracer:
         return Panorama(*self._seen(position, FACES, np.pi / 2, (s, s), rng))
 
     def picture(
-        self, position: Triple, forward: Triple, up: Triple, vfov: float, size: tuple[int, int], *, name: int = 0
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        self, position: Triple, forward: Triple, up: Triple, vfov: float, size: Pixels, *, name: int = 0
+    ) -> Planes:
         """(h, w, 3) uint8, (h, w) float32 depth along the axis, (h, w) int32 ids of a pinhole camera."""
         rng = stream(self._seed, "light", "trace", self.quality, name)
         rgb, depth, ids = self._seen(position, [(forward, up)], vfov, size, rng)
         return rgb[0], depth[0], ids[0]
 
     def _seen(
-        self,
-        position: Triple,
-        views: Sequence[tuple[Triple, Triple]],
-        vfov: float,
-        size: tuple[int, int],
-        rng: np.random.Generator,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        self, position: Triple, views: Sequence[Look], vfov: float, size: Pixels, rng: np.random.Generator
+    ) -> Planes:
         """As `picture`, of several cameras in one place, (forward, up) each: (v, h, w, 3), (v, h, w) and (v, h, w)."""
         shape = (len(views), *size)
         n = math.prod(shape)
@@ -119,7 +117,7 @@ class Tracer:
         depth = np.where(ok, t * along, np.inf).reshape(shape).astype(np.float32)
         return rgb, depth, ids.reshape(shape).astype(np.int32)
 
-    def plain(self, position: Triple, forward: Triple, up: Triple, vfov: float, size: tuple[int, int]) -> np.ndarray:
+    def plain(self, position: Triple, forward: Triple, up: Triple, vfov: float, size: Pixels) -> np.ndarray:
         """(h, w) bool: pixels with no mirror or metal within two pixels."""
         hit = look(self._world, _camera_rays(position, [(forward, up)], vfov, size, 1, None))
         shiny = np.asarray(hit.ok & ~hit.outdoor & (hit.gloss.z > SHINY)).reshape(size)
@@ -290,12 +288,7 @@ def _smoothed(light: np.ndarray, guide: np.ndarray, noise: np.ndarray) -> np.nda
 
 
 def _camera_rays(
-    position: Triple,
-    views: Sequence[tuple[Triple, Triple]],
-    vfov: float,
-    size: tuple[int, int],
-    each: int,
-    rng: np.random.Generator | None,
+    position: Triple, views: Sequence[Look], vfov: float, size: Pixels, each: int, rng: np.random.Generator | None
 ) -> Ray:
     """`each` rays per pixel, pixel by pixel and camera by camera within a round; through pixel centres without an
     rng."""
