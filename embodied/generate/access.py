@@ -119,8 +119,8 @@ def outer_stretches(
             at = max(at, q)
         if high > at:
             stretches.append((SharedWall(axis, across, at, high), side))
-    high = ((beside_slopes(cells[i], wall), side) for wall, side in stretches)
-    return sorted((f for f in high if f[0].length > 0), key=lambda f: (-f[0].length, f[0]))
+    upright = ((beside_slopes(cells[i], wall), side) for wall, side in stretches)
+    return sorted((f for f in upright if f[0].length > 0), key=lambda f: (-f[0].length, f[0]))
 
 
 def has_outer_doors(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> bool:
