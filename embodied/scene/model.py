@@ -431,6 +431,8 @@ def _add_insides(spec: mujoco.MjSpec, cases: Mapping[str, Case], lying: Sequence
         corners = mesh.vertices[mesh.faces]
         way = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])).argmax(1)
         for axis in np.unique(way):
+            if not _is_drawable(dataclasses.replace(mesh, faces=mesh.faces[way == axis])):
+                continue  # slivers of what was cut
             name, rgba = f"inside_{k}_{axis}", (*(INSIDE_DIM[axis] * color).tolist(), float(finish.color[3]))
             _add_mesh(spec, name, mesh.vertices, mesh.normals, mesh.uv, mesh.faces[way == axis])
             _draw(carrier.body, f"{part.owner}#{name}", name, PROBE_LIT, rgba, pos=carrier.origin)
