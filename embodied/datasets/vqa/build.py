@@ -171,7 +171,8 @@ def two_visits(world: World, node: int, to: Path, name: str, rng: np.random.Gene
 def free_spot(world: World, p: Placement, others: Sequence[Any], rng: np.random.Generator) -> Triple | None:
     """Free floor of its room to which a thing can be moved, metres, MOVED_BY from where it was and from others."""
     floor = world.house.floor(world.house.room_by_id[p.room])
-    for x, y in rng.uniform(*np.reshape(floor.bounds, (2, 2)), (100, 2)).tolist():
+    low, high = np.reshape(floor.bounds, (2, 2))
+    for x, y in rng.uniform(low, high, (100, 2)).tolist():
         reach = max(p.size[:2]) / 2
         around = [(x + reach * math.cos(a), y + reach * math.sin(a), others[0][2]) for a in range(6)]
         far = min(math.dist((x, y), at[:2]) for at in (p.position, *others)) > MOVED_BY
