@@ -68,10 +68,8 @@ def test_missing_features_name_the_command_that_makes_them(data, tmp_path, capsy
 def test_walks_of_a_data_set_are_written_in_its_houses(tmp_path, monkeypatch):
     live_among_boxes(monkeypatch)
     data = build(tmp_path / "data", tmp_path / "cache", "vln", size="1x2", make_house=boxes_house)
-    found = drive.data_worlds
-    monkeypatch.setattr(
-        drive, "data_worlds", lambda folder, split, cache, _: found(folder, split, cache, Unlit(size=64))
-    )
+    found = drive.chosen_worlds
+    monkeypatch.setattr(drive, "chosen_worlds", lambda **where: found(**where, pictures=Unlit(size=64)))
     order = ["export", "vlnce", "--data", str(data.folder), "--out", str(tmp_path / "out"), "--cache"]
     assert cli.main([*order, str(tmp_path / "cache"), "--tasks", "1", "--width", "64", "--action-noise", "0.1"]) == 0
     rows = [json.loads(line) for line in (tmp_path / "out/samples.jsonl").read_text().splitlines()]
@@ -84,7 +82,8 @@ def test_drives_are_written_in_every_house_of_a_split(data, tmp_path, monkeypatc
     flat, how = furnished(two_rooms()), {"size": 32, "pictures": "unlit"}
     houses = [dataclasses.replace(flat, name=name) for name in ("left", "right")]
     worlds = {house.name: open_world(house, HandCatalogue(), tmp_path / "cache", **how) for house in houses}
-    monkeypatch.setattr(drive, "data_worlds", lambda *_: worlds)
+    found = drive.chosen_worlds
+    monkeypatch.setattr(drive, "chosen_worlds", lambda **how: found(**how, worlds=worlds))
     order = ["export", "lerobot-drive", "--data", str(data.folder), "--out", str(tmp_path / "out"), "--size", "16"]
     assert cli.main([*order, "--drives", "2"]) == 0
     episodes = pq.read_table(tmp_path / "out/meta/episodes/chunk-000/file-000.parquet").to_pydict()
