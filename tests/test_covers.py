@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from embodied.assets.importing.looks import COVERS, cover_of, creased, kind_of, laid_on, picture
+from embodied.assets.importing.looks import COVERS, cover_of, creased, laid_on, picture
 
 OAK, WHITE = (0.72, 0.58, 0.42), (0.9, 0.9, 0.9)
 
@@ -21,19 +21,20 @@ def test_a_cover_keeps_the_colour_and_repeats_without_a_seam(cover):
 
 
 def test_a_word_decides_before_a_name_and_paint_hides_wood():
-    assert cover_of("Material.001", WHITE, "", clear=False) is None
-    assert cover_of("Bed sheet", WHITE, "", clear=False) == "cloth"
-    assert cover_of("doll skin", WHITE, "", clear=False) is None
-    assert cover_of("Bed sheet", WHITE, "#ffffff bedding", clear=False) == "bedding"
-    assert cover_of("Bed sheet", WHITE, "plain", clear=False) is None
-    assert cover_of("wood", OAK, "", clear=False) == "wood"
-    assert cover_of("wood", (0.35, 0.24, 0.16), "", clear=False) == "dark wood"
-    assert cover_of("wood", WHITE, "", clear=False) is None
-    assert cover_of("wood", OAK, "#b8946a paint", clear=False) is None
-    assert cover_of("glass with wood", OAK, "", clear=True) is None
+    assert cover_of("Material.001", WHITE, "", textured=False, clear=False) is None
+    assert cover_of("Bed sheet", WHITE, "", textured=False, clear=False) == "cloth"
+    assert cover_of("doll skin", WHITE, "", textured=False, clear=False) is None
+    assert cover_of("Bed sheet", WHITE, "#ffffff bedding", textured=False, clear=False) == "bedding"
+    assert cover_of("Bed sheet", WHITE, "plain", textured=False, clear=False) is None
+    assert cover_of("wood", OAK, "", textured=False, clear=False) == "wood"
+    assert cover_of("wood", (0.35, 0.24, 0.16), "", textured=False, clear=False) == "dark wood"
+    assert cover_of("wood", WHITE, "", textured=False, clear=False) is None
+    assert cover_of("wood", OAK, "#b8946a paint", textured=False, clear=False) is None
+    assert cover_of("glass with wood", OAK, "", textured=False, clear=True) is None
 
 
 def test_a_texture_is_taken_for_what_a_word_or_its_name_says():
+    kind_of = lambda name, look: cover_of(name, WHITE, look, textured=True, clear=False)
     assert kind_of("RED_OAK.001", "") == "wood" and kind_of("cloak", "") is None
     assert kind_of("Material", "") is None and kind_of("Material", "cloth") == "cloth"
     assert kind_of("wood", "plain") is None

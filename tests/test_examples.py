@@ -128,6 +128,6 @@ def test_agents_among_people_are_trained_and_judged(run, tmp_path, monkeypatch):
         "social_navigation.py",
         *["--flats", "1", "--unseen", "1", "--imitate", "60", "--steps", "1", "--judge", "1", "--out", "out"],
     )
-    for kind, last in (("social", "PPO, out"), ("follow", "knows where the person is")):
+    for kind, last in (("social", "PPO, out"), ("follow", "knows, and steps aside")):
         table = json.loads((tmp_path / "out" / f"social-{kind}.json").read_text())
         assert table["rows"][-1]["label"] == last and {c["key"] for c in table["columns"]} >= {"success"}

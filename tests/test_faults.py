@@ -131,7 +131,7 @@ REVIEWED = {
     "agents/bandit/corpus.py": "the mark of a whole corpus, before it writes another",
     "embodied/cli/serve.py": "its own links, before it writes them anew",
     "embodied/locks.py": "its own lock",
-    "embodied/datasets/lerobot.py": "an empty folder",
+    "embodied/datasets/build.py": "an empty folder",
     "embodied/light/baking/house.py": "a bake in the cache",
     "embodied/light/pages/files.py": "a bake in the cache",
     "embodied/scene/collision.py": "a file in the cache",

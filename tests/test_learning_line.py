@@ -6,6 +6,7 @@ import argparse
 import dataclasses
 import json
 import shlex
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -148,7 +149,8 @@ def test_the_papers_columns_take_the_likeliest_action_and_ours_stand_apart(study
     assert {plain.policy.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {1} and not plain.use_goal_image
     assert {shipped.policy.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {0, 1} and shipped.use_goal_image
     assert plain.revisit_weight == 1 and shipped.revisit_weight < 1
-    assert plain.policy.ask_rule(0.6, None, -1, rng=draws[0]) and not plain.policy.ask_rule(0.4, None, -1, rng=draws[0])
+    asks = lambda probability: plain.policy.ask_rule(probability, SimpleNamespace(target=None), -1, rng=draws[0])
+    assert asks(0.6) and not asks(0.4)
 
 
 def test_agents_that_are_compared_differ_in_one_setting(study):

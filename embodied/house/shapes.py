@@ -9,6 +9,8 @@ import shapely
 from embodied.geometry import rectangle
 from embodied.house.house import House, Opening, Placement, Room, Stair
 
+ROOF = 0.25
+"""Thickness of a roof, upright, metres."""
 _floor = functools.lru_cache(maxsize=256)(shapely.Polygon)
 """A room's: every picture asks where its camera is."""
 

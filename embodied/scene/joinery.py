@@ -15,10 +15,10 @@ import numpy as np
 from embodied.assets.built.primitives import Shape, between, box, cylinder, frame, joined, part, quads, tube, upright
 from embodied.assets.records import Finish
 from embodied.house.house import GLAZED, House, Opening
-from embodied.house.shapes import inward, slope_over
+from embodied.house.shapes import ROOF, inward, slope_over
 from embodied.scene.outdoors import facade_finish
 from embodied.scene.part import Part
-from embodied.scene.walls import ROOF, floor_turn, turned_uv
+from embodied.scene.walls import floor_turn, turned_uv
 from embodied.seeds import stream
 
 PIECES = ("reveal", "frame", "leaf", "leaf_2", "handle", "glass", "sill", "threshold")

@@ -9,9 +9,9 @@ import shapely.affinity
 
 from embodied.assets.built.primitives import Shape, flat
 from embodied.house.house import House, Room
-from embodied.house.shapes import roof_hole, under_slopes
+from embodied.house.shapes import ROOF, roof_hole, under_slopes
 from embodied.scene.collision import CollisionBox
-from embodied.scene.walls import ROOF, Hole
+from embodied.scene.walls import Hole
 
 
 def lifted(shape: Shape, line: tuple[np.ndarray, np.ndarray, float], z: float) -> Shape:

@@ -9,8 +9,6 @@ from embodied.house.house import House, Opening
 
 Hole = tuple[float, float, float, float]
 """s0, z0, s1, z1 of a rectangle in a wall face: metres along the face, world heights."""
-ROOF = 0.25
-"""Thickness of a roof, upright, metres."""
 TOLERANCE = 2e-3
 """How far an opening's jambs may lie off a wall's centre line, metres."""
 

@@ -15,11 +15,10 @@ from embodied.assets.cache import write_bytes
 from embodied.assets.decoding import open_arrays, packed
 from embodied.geometry import r2
 from embodied.house.house import GLAZED, House, Opening
-from embodied.house.shapes import inward, slope_over
+from embodied.house.shapes import ROOF, inward, slope_over
 from embodied.light.backend import Array, RayScene, accumulate, dr, fraction, mi, opaque_float, vector
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.unwrap import areas_of, face_normals
-from embodied.scene.walls import ROOF
 
 GLAZING = 0.88
 """Share of light that clean double glazing lets through."""
