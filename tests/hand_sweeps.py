@@ -65,7 +65,7 @@ def sweeps(house: House, catalogue: Catalogue) -> Sweeps:
             continue
         body, root = (model.body(int(b)).name for b in (model.jnt_bodyid[j], model.body_rootid[model.jnt_bodyid[j]]))
         holds = f"{root}/{body.removeprefix(root + '_')}" in full
-        kinds = r"(door|front_door|back_door|window|french_window)_\d+_\w*hinge"
+        kinds = r"(door|front_door|back_door|window|french_window)_\d+_\w*hinge(_\d+)?"
         kind = m[1].replace("french_", "") if (m := re.fullmatch(kinds, name)) else "holds" if holds else "furniture"
         joints[kind] += 1
         passes = doors if kind in ("window", "furniture", "holds") else set()
