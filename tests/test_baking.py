@@ -23,7 +23,7 @@ from embodied.house.house import Light, Sky
 from embodied.house.shapes import inward, room_at
 from embodied.light import LightError, StaleBake, backend, bake, bake_all, lightings_of, open_bake
 from embodied.light.backend import array, floats
-from embodied.light.baking import check, solve
+from embodied.light.baking import check, compose, solve
 from embodied.light.baking import house as baking
 from embodied.light.pages import files
 from embodied.light.probes import harmonics
@@ -130,6 +130,15 @@ def test_a_third_of_the_luxels_dark_slips_through_one_time_in_eight_at_most(solu
 
 def key(house, catalogue):
     return baking.key_of(house, baking.looks_of(house_parts(house, catalogue)), TINY)
+
+
+def test_gaps_take_light_from_beside_them_on_the_same_thing_alone():
+    position = np.array([[0, 0, 0], [0.02, 0, 0], [0.03, 0, 0], [0.5, 0, 0], [0.02, 0, 0]], np.float32)
+    e = np.array([[1.0] * 3, [0.01] * 3, [0.9] * 3, [0.01] * 3, [0.01] * 3], np.float32)
+    good, owner = np.array([True, False, False, False, False]), np.array([0, 0, 0, 0, 1])
+    lit = compose.out_of_gaps(e, position, owner, good, good)
+    assert lit[:, 0] == pytest.approx([1.0, compose.GAP_SHARE, 0.9, 0.01, 0.01])
+    assert (compose.out_of_gaps(e, position, owner, good, np.ones(5, bool)) == e).all()
 
 
 def test_another_look_of_a_material_makes_another_bake(lit):

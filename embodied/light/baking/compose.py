@@ -8,6 +8,7 @@ from typing import TypeAlias, TypeVar
 import cv2
 import numpy as np
 import shapely
+from scipy.spatial import cKDTree
 
 from embodied.house.house import House
 from embodied.light.backend import (
@@ -122,7 +123,9 @@ def page_of(number: int, composer: Composer) -> Ingredients:
     solution = composer.solution
     page, coarse, luxels = solution.atlas.pages[number], solution.lux.texels[number], composer.luxels(number)
     light = np.concatenate([composer.soft[luxels], solution.light.sun[luxels, None]], axis=1)
-    good = solution.light.good[luxels]
+    good, shell = solution.light.good[luxels], solution.lux.shell[luxels]
+    light[:, :3] = out_of_gaps(light[:, :3], coarse.position, solution.lux.owner[luxels], good, good | shell)
+    good |= ~shell
     known = filled(composer.kept("filling", number, lambda: filling(coarse.index, good, coarse.shape)), light)
     soft, share = np.ascontiguousarray(known[..., :3]), known[..., 3]
     fine = lambda: cover(page, page.fineness, solution.lux.sheets[number])
@@ -364,6 +367,30 @@ def filled(filling: Filling, own: np.ndarray) -> np.ndarray:
     theirs, at = flat[filling.index], filling.index
     flat[at] = theirs * filling.weight + np.minimum(own[filling.hidden], theirs) * (1 - filling.weight)
     return flat.reshape(*filling.shape, -1)
+
+
+GAP, GAP_SHARE = 0.05, 0.6
+"""Metres from which a luxel in a gap takes light, and the least share of that light it has."""
+
+
+def out_of_gaps(
+    e: np.ndarray, position: np.ndarray, owner: np.ndarray, good: np.ndarray, kept: np.ndarray
+) -> np.ndarray:
+    """Light (n, 3) of luxels; those in gaps get at least a share of what the nearest in the open has on the same thing.
+
+    The gap between two doors of a cabinet is dark, but it is narrower than a luxel, which carries the dark onto the
+    edges, and narrower than a pixel, which shows it as black dashes.
+
+    Args:
+      position: (n, 3). owner: (n,). good: (n,) bool, luxels in the open. kept: (n,) bool, luxels that stay as they are.
+    """
+    out, (at, gaps) = e.copy(), (np.flatnonzero(x) for x in (good, ~kept))
+    if len(at):
+        where = np.column_stack([position, owner * 2 * GAP])
+        far, near = cKDTree(where[at]).query(where[gaps], distance_upper_bound=GAP)
+        gaps, near = gaps[np.isfinite(far)], at[near[np.isfinite(far)]]
+        out[gaps] = np.maximum(e[gaps], GAP_SHARE * e[near])
+    return out
 
 
 def spread(index: np.ndarray, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

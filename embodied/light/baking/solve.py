@@ -39,7 +39,7 @@ class Radiosity:
     indirect: np.ndarray
     """All other bounces."""
     good: np.ndarray
-    """(n,) bool; false on walls, floors and ceilings behind things."""
+    """(n,) bool; false behind and inside things, and in gaps."""
 
     @property
     def soft(self) -> np.ndarray:
@@ -318,4 +318,4 @@ def solve(inputs: BakeInput, tell: Callable[[str, float], None] = lambda stage, 
     grain = denoise.spatial_variance(direct, grid) * 0.8
     direct = denoise.smooth_pages(direct, grid, good, variance=grain, likeness=(0.3, 0.2))
     free_memory()
-    return Radiosity(direct, share, patches, indirect + outer_light(inputs), good | ~lux.shell)
+    return Radiosity(direct, share, patches, indirect + outer_light(inputs), good)
