@@ -80,6 +80,9 @@ def test_a_house_with_hinges_looks_as_one_without(lit):
                     corners = model.mesh_vert[first : first + count] @ turn.T + data.geom_xpos[g]
                     places[name] = np.concatenate([corners.min(0), corners.max(0)])
         seen.append(places)
+        frame = [g for g in range(model.ngeom) if model.geom(g).name.startswith("window_1/frame#")]
+        carriers = {model.body(model.geom_bodyid[g]).name for g in frame}
+        assert carriers == ({"world", "casement_window_1", "casement_window_1_2"} if hinged else {"world"})
     assert seen[0].keys() == seen[1].keys() and len(seen[0]) >= 4
     for name, box in seen[0].items():
         np.testing.assert_allclose(seen[1][name], box, atol=2e-4)

@@ -24,11 +24,12 @@ gl.prepare()
 import cv2
 import mujoco
 import numpy as np
+from scipy.spatial import cKDTree
 
 from embodied.assets.moving_parts import closed
 from embodied.assets.records import Finish, MeshPart
-from embodied.geometry import rotation
 from embodied.house.house import House, Placement
+from embodied.house.moment import RigidPose
 from embodied.scene import backdrop, collision, cupboards, doors, far_canvas, stairs
 from embodied.scene.cupboards import Case
 from embodied.scene.doors import Hung
@@ -182,8 +183,7 @@ def build_spec(
     spec = _empty_spec(house)
     if free or hinged:
         _let_move(spec)
-    apart = hinged and lit is None
-    shell = parts or (shell_parts(house, catalogue.finish, apart) if hinged or collisions else ())
+    shell = parts or (shell_parts(house, catalogue.finish, hinged) if hinged or collisions else ())
     hung = doors.hang(spec, house, shell) if hinged else {}
     cases = cupboards.hang(spec, house, catalogue, free) if hinged else {}
     lying = list(cupboards.lying(cases, contents, catalogue))
@@ -191,18 +191,17 @@ def build_spec(
     if lit is None:
         _light(spec)
         _add_sky(spec, house, getattr(catalogue, "cache", None))
-        parts = house_parts(house, catalogue, apart) if parts is None else parts
+        parts = house_parts(house, catalogue, hinged) if parts is None else parts
         own = lambda p: bodies.get(p.owner) or (hung.get((p.owner, p.position)) if doors.is_leaf(p) else None)
         carried = [(p, own(p)) for p in parts if p.owner not in cases]
         _add_parts(spec, [*carried, *(x for case in cases.values() if parts for x in cupboards.parts_of(case)), *lying])
     else:
         spec.visual.headlight.active = 0
         spec.add_material(name=PROBE_LIT, emission=1.0, specular=0.0, shininess=0.0)
-        frames: dict[str, tuple[Part | Placement, Hung]]
-        frames = {
-            p.owner: (p, hung[p.owner, p.position]) for p in shell if doors.is_leaf(p) and (p.owner, p.position) in hung
-        }
-        frames |= {p: (house.placement_by_id[p], body) for p, body in bodies.items()}
+        frames: dict[str, list[tuple[Part | Placement, Hung | None]]] = {}
+        for p in shell if hung else ():
+            frames.setdefault(p.owner, []).append((p, hung.get((p.owner, p.position)) if doors.is_leaf(p) else None))
+        frames |= {p: [(house.placement_by_id[p], body)] for p, body in bodies.items()}
         _add_pages(spec, lit, house, lambda m: _lit_pieces(m, frames, cases))
         _add_insides(spec, cases, lying)
     if collisions:
@@ -406,17 +405,25 @@ def _add_pages(
 
 
 def _lit_pieces(
-    m: LitMesh, frames: Mapping[str, tuple[Part | Placement, Hung]], cases: Mapping[str, Case]
+    m: LitMesh, frames: Mapping[str, Sequence[tuple[Part | Placement, Hung | None]]], cases: Mapping[str, Case]
 ) -> Iterable[tuple[LitMesh, Hung | None]]:
-    """A lit mesh in the frames of the bodies that carry it."""
+    """A lit mesh in the frames of the bodies that carry it: the frame of a window and its casements are one."""
     if m.owner in cases:
-        return cupboards.lit_parts(m, cases[m.owner])
-    if m.owner not in frames:
-        return [(m, None)]
-    frame, carrier = frames[m.owner]
-    vertices = m.vertices - np.array(frame.position, np.float32)
-    vertices[:, :2] = vertices[:, :2] @ rotation(frame.yaw).astype(np.float32)
-    return [(dataclasses.replace(m, vertices=vertices), carrier)]
+        yield from cupboards.lit_parts(m, cases[m.owner])
+        return
+    of = frames.get(m.owner, ())
+    if all(carrier is None for _, carrier in of):
+        yield m, None
+        return
+    poses, which = [RigidPose.upright(x.position, x.yaw) for x, _ in of], np.zeros(len(m.faces), int)
+    if len(of) > 1:
+        middles = [x.mesh.vertices[x.mesh.faces].mean(1) for x, _ in of if isinstance(x, Part)]
+        there = np.concatenate([x @ pose.rotation.T + pose.position for x, pose in zip(middles, poses, strict=True)])
+        near = cKDTree(there).query(m.vertices[m.faces].mean(1))[1]
+        which = np.repeat(np.arange(len(of)), [len(x) for x in middles])[near]
+    for k, ((_, carrier), pose) in enumerate(zip(of, poses, strict=True)):
+        vertices = m.vertices if carrier is None else pose.local(m.vertices)
+        yield dataclasses.replace(m, vertices=vertices, faces=m.faces[which == k]), carrier
 
 
 def _add_insides(spec: mujoco.MjSpec, cases: Mapping[str, Case], lying: Sequence[tuple[Part, Hung]]) -> None:
