@@ -21,6 +21,7 @@ from typing import Annotated, Any
 
 from embodied.cli.common import Furnished, Printed, check_machine, note, pause, show
 from embodied.cli.vqa import VQA, make
+from embodied.generate.config import SPECIAL
 from embodied.kinds.splits import DATASET_SCALES, DatasetSize, described
 from embodied.options import HOUSES, Count, CubeFace, InputFolder, InputPath, Option, OutputFolder, drawn_as, whole
 from embodied.render.pictures import PICTURES, PictureSettings, in_words, parse_pictures
@@ -51,6 +52,8 @@ class DatasetOptions(Furnished, Printed):
     """Size of the houses in square metres."""
     storeys: Annotated[int, Option(whole(0, 3), "N")] = 1
     """Storeys of every house, 0: drawn from its seed."""
+    special: Annotated[tuple[str, ...], Option(words=SPECIAL)] = ()
+    """Rooms of every house that are no boxes, where there is a place for them (not vqa)."""
     language: Annotated[str, Option(words=("people", "landmarks", "plain"))] = "people"
     """Wording of the routes: varied, with habits and landmarks (people), always with landmarks, of paths on which turns
     alone lead astray (landmarks), or plain turns and rooms (plain)."""
@@ -115,7 +118,8 @@ def run(args: DatasetOptions) -> None:
     from embodied.generate import HouseConfig
 
     HouseConfig(area=args.area, storeys=args.storeys or None)  # refuses what no house can have, before a folder is made
-    words: dict[str, Any] = {"language": args.language, "rooms": not args.no_rooms, "storeys": args.storeys or None}
+    words: dict[str, Any] = {"language": args.language, "rooms": not args.no_rooms, "special": args.special}
+    words["storeys"] = args.storeys or None
     people = not args.no_people
     config = DatasetConfig(args.kind, chosen_scale(args), args.seed, args.area, people=people, ood=args.ood, **words)
     watch = lambda jobs, total: tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())

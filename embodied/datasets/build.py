@@ -45,7 +45,7 @@ VOICES: Mapping[str, Callable[[str | None], Language]] = {
 """Name to a maker of voices, by the novelty of who speaks."""
 GROWTH = 3 * 2**30
 """Bytes by which a worker may grow before it is ended and another one begun."""
-LATER: Mapping[str, object] = {"rooms": True, "ood": 0, "own": "", "storeys": 1}
+LATER: Mapping[str, object] = {"rooms": True, "ood": 0, "own": "", "storeys": 1, "special": ()}
 """Settings that data sets have not always had, with their defaults."""
 SEEDS = 12
 """House seeds tried before giving up on a house of the data set."""
@@ -68,6 +68,8 @@ class DatasetConfig:
     """Smallest and largest house, square metres."""
     storeys: int | None = 1
     """Of every house, 1 to 3; None: drawn from its seed (HouseConfig)."""
+    special: tuple[str, ...] = ()
+    """Rooms of every house that are no boxes (HouseConfig)."""
     routes: str = "sampled"
     """'sampled', as in Room-to-Room."""
     people: bool = True
@@ -341,7 +343,7 @@ def _write_unit(
 ) -> None:
     novelty = config.novelty_of(unit.group)
     language = VOICES[config.language](novelty)
-    settings = HouseConfig(area=config.area, storeys=config.storeys, special=(), novelty=novelty)
+    settings = HouseConfig(area=config.area, storeys=config.storeys, special=config.special, novelty=novelty)
     house, graph = make_house(config.seed, unit.name, settings, catalogue)
     house_split = {"extra": "train", "ood": "test"}.get(unit.group, unit.group)
     paths: list[tuple[int, ...]] = []

@@ -13,7 +13,7 @@ from embodied.assets.cache import atomic_path, write_bytes, write_json
 from embodied.errors import UnableError
 from embodied.house.house import House
 from embodied.house.moment import WIDEST
-from embodied.house.shapes import footprint
+from embodied.house.shapes import footprint, opening_of
 from embodied.navigation.graph import NavGraph
 
 NEXT_TO = 0.3
@@ -139,7 +139,7 @@ def write_spark_dsg(facts: dict[str, Any], path: Path) -> None:
 def write_semantic_maps(house: House, folder: Path) -> int:
     """Write map_<storey>.png and .json for every storey, and return how many there are.
 
-    The picture has a class in each pixel of MAP_STEP: 0 outside, then what `classes` of the JSON lists; floors are
+    The picture has a class in each pixel of MAP_STEP: 0 outside and over stairs, then what `classes` of the JSON lists; floors are
     named by the kind of their room, and what stands highest covers what is below. Row 0 is the largest y; the JSON has
     `origin` (x, y of the lower left corner, metres) and `step`.
     """
@@ -159,6 +159,9 @@ def write_semantic_maps(house: House, folder: Path) -> int:
         for room in rooms:
             fill(house.floor(room), number[room.kind])
         of_storey = {r.id for r in rooms}
+        for stair in house.stairs:
+            if stair.rooms[1] in of_storey:
+                fill(opening_of(stair), 0)
         for p in sorted(house.placements, key=lambda p: p.position[2] + p.size[2]):
             if p.room in of_storey:
                 fill(footprint(p), number[p.object_class])

@@ -79,7 +79,7 @@ def _case(spec: mujoco.MjSpec, p: Placement, whole: TakenApart) -> Case:
             body.mass, body.inertia, body.ipos, body.explicitinertial = 1.0, [0.2, 0.2, 0.01], [0, 0, 0], True
             for name, far, _ in _strips(m)[:-1]:
                 strip = still.add_body(name=f"{p.id}_{name}", pos=m.origin + far * shift, gravcomp=1.0, mass=0.1)
-                strip.inertia, strip.explicitinertial = [0.02, 0.02, 0.001], True
+                strip.inertia, strip.ipos, strip.explicitinertial = [0.02, 0.02, 0.001], [0, 0, 0], True
                 strip.add_joint(name=strip.name, type=kind, axis=m.axis, ref=far * joint.ref, damping=1.0)
                 both = {"name1": strip.name, "name2": joint.name, "objtype": mujoco.mjtObj.mjOBJ_JOINT}
                 spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, **both, data=[0, far, *[0] * 10])

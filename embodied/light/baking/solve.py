@@ -138,19 +138,24 @@ def outer_light(inputs: BakeInput, samples: int = 24) -> np.ndarray:
     What faces the room takes none: its luxels at the frame's edge lie in the plane of the lintel, from where
     every second ray runs up inside the wall.
     """
-    house, atlas, lux, space = inputs.house, inputs.atlas, inputs.lux, inputs.space
+    house, lux, space = inputs.house, inputs.lux, inputs.space
     e = np.zeros((len(lux.position), 3), np.float32)
-    into = {o.id: inward(house, o) for o in house.openings if None in o.rooms}
-    outer = [k == "opening" and o.split("/")[0] in into for o, k in zip(atlas.owners, atlas.kinds)]
-    inwards = [into[o.split("/")[0]] if x else [np.nan] * 2 for o, x in zip(atlas.owners, outer)]
-    inward_of = np.array(inwards).reshape(-1, 2)[lux.owner]
-    outer_side = np.nonzero((lux.face_normal[:, :2] * inward_of).sum(1) < 0.7)[0]
+    outer_side = np.nonzero(_facing_in(inputs) < 0.7)[0]
     if not len(outer_side):
         return e
     ways = portals_of(house)
     scene = Together((space.scene, radiosity.portal_scene(ways))) if ways else space.scene
     e[outer_side] = radiosity.open_sky(scene, space.env, inputs.at(outer_side), samples, mi.Color3f(0.0))
     return e
+
+
+def _facing_in(inputs: BakeInput) -> np.ndarray:
+    """(n,) how far luxels of windows and outer doors face the room, level, 1 to -1; nan of all else."""
+    house, atlas, lux = inputs.house, inputs.atlas, inputs.lux
+    into = {o.id: inward(house, o) for o in house.openings if None in o.rooms}
+    outer = [k == "opening" and o.split("/")[0] in into for o, k in zip(atlas.owners, atlas.kinds)]
+    inwards = [into[o.split("/")[0]] if x else [np.nan] * 2 for o, x in zip(atlas.owners, outer)]
+    return (lux.face_normal[:, :2] * np.array(inwards).reshape(-1, 2)[lux.owner]).sum(1)
 
 
 def _lit_by(inputs: BakeInput, patches: Patches, which: np.ndarray) -> np.ndarray:
@@ -181,8 +186,9 @@ def sun_light(inputs: BakeInput) -> tuple[np.ndarray, np.ndarray]:
 
 
 def sunlit(inputs: BakeInput, share: np.ndarray, most: int) -> Iterator[Patches]:
-    """At most so many small lights for each room and opening where luxels have a share (n,) of the sun."""
-    lux = inputs.lux
+    """At most so many small lights for each room and opening where luxels have a share (n,) of the sun, what faces
+    outdoors left out."""
+    lux, share = inputs.lux, np.where(_facing_in(inputs) < -0.3, 0.0, share)
     flux = lux.albedo * (share * lux.area)[:, None] * (inputs.outdoors.sun * radiosity.GLAZING)
     for u in np.unique(lux.unit[share > 0]):
         patches = _patches(lux, flux, np.nonzero((lux.unit == u) & (share > 0))[0], most)

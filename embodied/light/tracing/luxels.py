@@ -114,14 +114,12 @@ def with_glow(lux: Luxels, house: House, atlas: Atlas, lamps: Sequence[Lamp]) ->
 
 
 def _share_of_area(page: Page, t: Texels) -> np.ndarray:
-    """(n,) square metres each luxel stands for: its face's area shared out, every owner's sum kept exact."""
-    faces = areas_of(page.corners)
-    count = np.bincount(t.face, minlength=len(faces))
-    given = np.where(count > 0, faces, 0.0)
+    """(n,) square metres each luxel stands for: what it covers of its face, every owner's sum kept exact."""
+    faces, (u, v) = areas_of(page.corners), np.moveaxis(page.luxels[:, 1:] - page.luxels[:, :1], 1, 0)
+    each = faces / np.maximum(np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2, 1e-3)
     size = int(page.owner.max()) + 1 if len(page.owner) else 0
-    whole, got = (np.bincount(page.owner, weights=w, minlength=size) for w in (faces, given))
-    scale = whole / np.maximum(got, 1e-12)
-    return (faces / np.maximum(count, 1) * scale[page.owner]).astype(np.float32)[t.face]
+    whole, got = np.bincount(page.owner, faces, size), np.bincount(page.owner[t.face], each[t.face], size)
+    return (each * (whole / np.maximum(got, 1e-12))[page.owner]).astype(np.float32)[t.face]
 
 
 def glow_of(house: House, atlas: Atlas, page: Page, face: np.ndarray, lamps: Sequence[Lamp]) -> np.ndarray | None:
