@@ -15,7 +15,7 @@ from hand_light import TINY
 from handmade import box_mesh
 
 from embodied.assets.people import POSES, people, posed
-from embodied.assets.records import Finish
+from embodied.assets.records import Finish, MeshPart
 from embodied.bench.light import psnr, ssim
 from embodied.house.house import House, Light, Room, Sky, Storey
 from embodied.light import LightError, settings_of
@@ -133,6 +133,19 @@ def test_noise_goes_and_an_edge_stays():
     out = smooth_pages(clean * (1 + noise), Grid(atlas, lux.texels), all_, variance=variance, likeness=likeness)
     assert np.abs(out / clean - 1).mean() < 0.4 * np.abs(noise).mean()
     assert out[left].max() < 1.6 and out[~left].min() > 3.0
+
+
+def test_luxels_stand_for_what_they_cover_however_finely_a_sheet_is_cut(tmp_path):
+    cuts = np.append(0.0, np.linspace(0.5, 1.0, 41))
+    points = np.array([(x, y, 0.0) for x in cuts for y in np.linspace(0, 1, 41)])
+    first = (np.arange(len(cuts) - 1)[:, None] * 41 + np.arange(40)).reshape(-1, 1)
+    faces = np.concatenate([first + [0, 41, 42], first + [0, 42, 1]]).astype(np.int32)
+    sheet = MeshPart(points, faces, np.tile([0.0, 0, 1], (len(points), 1)), points[:, :2], Finish((0.5,) * 3 + (1.0,)))
+    part = Part("sheet_1", "object", "a", sheet, "sheet")
+    lux = luxels.luxels_of(atlas_of(things_of([part], LightSettings(budget=200), tmp_path)), ColourMaps())
+    fine = lux.position[:, 0] > 0.5
+    assert len(lux.area) < len(faces) / 4 and lux.area.sum() == pytest.approx(1)
+    assert lux.area[fine].sum() == pytest.approx(0.5, abs=0.06)
 
 
 def test_pixels_left_out_do_not_count_in_the_bench():

@@ -196,6 +196,15 @@ def exported(tmp_path_factory):
     return mujoco.MjModel.from_xml_path(str(path)), json.loads((path.parent / "house_metadata.json").read_text())
 
 
+def test_a_hinged_house_with_a_blind_is_read_back_and_its_strips_follow_the_cloth(tmp_path):
+    a, w = CATALOGUE.assets["built/roller_blind_grey"], HOUSE.placements[0]
+    blind = Placement("blind_1", a.key, a.object_class, w.room, (2.0, 0.1, 1.0), math.pi, a.size)
+    house = dataclasses.replace(HOUSE, placements=(blind,))
+    model = mujoco.MjModel.from_xml_path(str(export_mjcf(house, CATALOGUE, tmp_path, hinged=True)))
+    strips = [b for b in range(model.nbody) if model.body(b).name.startswith("blind_1_cloth_")]
+    assert len(strips) > 1 and (model.body_mass[strips[1:]] > 0).all()
+
+
 def test_what_lies_in_closed_furniture_is_exported_with_the_part_that_carries_it(exported):
     model, _ = exported
     inside = contents(HOUSE, CATALOGUE, hidden=True)

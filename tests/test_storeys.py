@@ -11,10 +11,11 @@ import mujoco
 import numpy as np
 import pytest
 import shapely
-from PIL import ImageChops
+from PIL import Image, ImageChops
 
 from embodied.assets.catalogue import load_catalogue
 from embodied.assistants.descriptions import Describer, described
+from embodied.datasets.scene_graph import write_semantic_maps
 from embodied.envs.continuous import ContinuousEnv, ContinuousEpisode, NavigationGoal, ShortestPathFollower
 from embodied.generate import STAGES, HouseConfig, generate_house
 from embodied.generate.kinds import ROOM_TABLE
@@ -74,7 +75,7 @@ def test_rooms_of_three_storeys_are_not_stretched():
             assert r.kind in ("hall", "corridor") or shapely.Polygon(r.polygon).area < most, r.id
 
 
-def test_a_stairwell_with_a_gallery_is_open_to_the_storey_above_and_railed_all_around():
+def test_a_stairwell_with_a_gallery_is_open_to_the_storey_above_and_railed_all_around(tmp_path):
     config = HouseConfig(area=(200, 280), storeys=2, special=("gallery", "L", "bay"))
     house = generate_house(1, config, stages=BARE)
     (stair,), void = house.stairs, shapely.Polygon(house.stairs[0].void)
@@ -84,6 +85,11 @@ def test_a_stairwell_with_a_gallery_is_open_to_the_storey_above_and_railed_all_a
     rails = shapely.union_all([shapely.LineString([a[:2], b[:2]]).buffer(0.1) for a, b in railings(house, stair)])
     head = shapely.Point(stair.path[-1][:2]).buffer(stair.width / 2 + 0.1)
     assert void.exterior.difference(shapely.union_all([rails, head, well_of(stair).buffer(0.1)])).length < 0.1
+    write_semantic_maps(house, tmp_path)
+    low_corner = json.loads((tmp_path / "map_1.json").read_text())["origin"]
+    x, y = ((np.array(void.centroid.coords[0]) - low_corner) / 0.05).astype(int).tolist()
+    drawn = np.asarray(Image.open(tmp_path / "map_1.png"))[::-1]
+    assert drawn[y, x] == 0 and drawn.any(), "no floor in the opening"
     living = next(r for r in house.rooms if r.kind == "living_room")
     assert len(living.polygon) > 4
     assert {*build_graph(house).room_of_node} == {r.id for r in house.rooms}
