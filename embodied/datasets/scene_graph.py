@@ -139,9 +139,9 @@ def write_spark_dsg(facts: dict[str, Any], path: Path) -> None:
 def write_semantic_maps(house: House, folder: Path) -> int:
     """Write map_<storey>.png and .json for every storey, and return how many there are.
 
-    The picture has a class in each pixel of MAP_STEP: 0 outside and over stairs, then what `classes` of the JSON lists; floors are
-    named by the kind of their room, and what stands highest covers what is below. Row 0 is the largest y; the JSON has
-    `origin` (x, y of the lower left corner, metres) and `step`.
+    The picture has a class in each pixel of MAP_STEP: 0 outside and where the floor is open over stairs, then what
+    `classes` of the JSON lists; floors are named by the kind of their room, and what stands highest covers what is
+    below. Row 0 is the largest y; the JSON has `origin` (x, y of the lower left corner, metres) and `step`.
     """
     names = ["outside", *sorted({r.kind for r in house.rooms} | {p.object_class for p in house.placements})]
     number = {name: i for i, name in enumerate(names)}
