@@ -17,18 +17,19 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import shapely
 
 from embodied import interface
 from embodied.assistants.ask import BRING_QUESTIONS
 from embodied.assistants.descriptions import side
 from embodied.geometry import wrap
 from embodied.gym.bring import BringEnv, inside
-from embodied.gym.robot import OPENED
+from embodied.gym.robot import OPENED, SHUT
 from embodied.tasks.ask import look_of
 
-ARM, SEES, REACHED_IN = 0.25, 4.0, 1.5
+ARM, SEES, REACHED_IN, CLEAR = 0.25, 4.0, 1.5, 0.23
 """Metres from the base's middle to the hand when the arm is drawn in, within which a thing in the line of sight of the
-head is seen, and what lies in open furniture."""
+head is seen, and what lies in open furniture; and by which its middle stays away from open doors of furniture."""
 
 
 @dataclass(frozen=True)
@@ -139,27 +140,44 @@ class Skills:
         handle = body.handles[name]
         at, (way, aside) = body.data.xipos[handle].copy(), self._way(handle)
         stand = at[:2] + 0.5 * self._front(part.partition("/")[0]) + 0.3 * aside
-        for cells in self._spots(stand, 0.0, 0.7, best=0.0):
-            if self._reach(cells, body.data.xipos[handle]):
+        for cells in self._spots(stand, 0.0, 0.7, best=0.0, to=at):
+            beside = np.append(-0.05 * self._way(handle)[1], 0.0)  # away from the handle of another leaf
+            if self._reach(cells, body.data.xipos[handle] + beside):
                 self._hold = True
                 self._act(times=3)
-                for _ in range(80):
-                    way, aside = self._way(handle)
-                    if body.held != name or env.openness[part] > 0.95 or self.over:
+                opened = [env.openness[part]]
+                while body.held == name and opened[-1] < 0.95 and not self.over:
+                    if len(opened) > 15 and opened[-1] < opened[-15] + 0.02:
                         break
-                    self._follow(body.data.xipos[handle] + 0.06 * way, turns=bool(aside.any()))
+                    way, now = self._way(handle)
+                    self._follow(body.data.xipos[handle] + 0.06 * way, turns=bool(now.any()))
+                    opened.append(env.openness[part])
                 self.leave()
+                if aside.any() and SHUT < env.openness[part] < 0.95:
+                    self._push(handle, at, aside, part)
             if self.over or env.openness[part] >= OPENED:
                 break
         return f"{part} is {'open' if env.openness[part] >= OPENED else 'not open'}"
 
+    def _push(self, handle: int, at: np.ndarray, aside: np.ndarray, part: str) -> None:
+        """Push a door further open from within, whose handle was `at` when it was shut."""
+        body, front = self.env.body, self._front(part.partition("/")[0])
+        hinge = body.data.xanchor[body.model.body_jntadr[body.model.body_parentid[handle]]][:2]
+        wide = float((at[:2] - hinge) @ aside)
+        within = hinge + 0.5 * wide * aside + 0.1 * front
+        self._turn(within)
+        self._arm(None, math.dist(body.position, within) - ARM)
+        self._turn(over := hinge + 0.75 * wide * front)
+        self._arm(None, math.dist(body.position, over) - ARM)
+        self._arm(None, 0.0)
+
     def take(self, thing: str) -> str:
         """Drive up to a thing and take it."""
         body, at = self.env.body, self.env.body.thing(thing)
-        spots = self._spots(at, 0.4, 0.95)
+        spots = self._spots(at, 0.4, 0.95, to=at)
         if holder := self._in_open().get(thing):
-            spots = self._spots(at[:2] + 0.65 * self._front(holder), 0.0, 0.4, best=0.0)
-        if math.dist(body.position, at[:2]) < 0.95:
+            spots = self._spots(at[:2] + 0.65 * self._front(holder), 0.0, 0.4, best=0.0, to=at)
+        elif math.dist(body.position, at[:2]) < 0.95:
             spots.insert(0, np.array([self.env.ground.cell_at(body.position)]))
         for cells, above in [(c, a) for c in spots for a in (0.0, 0.2)]:
             if self._reach(cells, body.thing(thing), above):
@@ -258,11 +276,17 @@ class Skills:
     def _drive(self, cells: np.ndarray) -> bool:
         """Along a wide way to the nearest of some cells, at least one."""
         body, ground, stuck, tries, last = self.env.body, self.env.ground, 0, 0, self.env.body.position
-        ways = ground.wide_ways(cells)
+        here, shut = ground.cell_at(body.position), np.zeros(len(ground.xy), bool)
+        for leaf in self._leaves():
+            away = shapely.distance(shapely.points(ground.xy), leaf)
+            shut |= away < min(CLEAR, away[here])
+        ways = ground.wide_ways(cells, shut)
         for _ in range(600):
             if tries > 3 or self.over:
                 break
-            way = ground.xy[ways.cells(ground.cell_at(body.position))]
+            if not np.isfinite(ways.metres[here := ground.cell_at(body.position)]):
+                ways = ground.wide_ways(cells)  # doors give way, or not
+            way = ground.xy[ways.cells(here)]
             if (far := math.dist(way[-1], body.position)) < 0.06:
                 return True
             turn = self._bearing(way[min(3, len(way) - 1)])
@@ -276,14 +300,40 @@ class Skills:
                 stuck, tries = 0, tries + 1
         return False
 
-    def _spots(self, point: np.ndarray, low: float, high: float, best: float = 0.65) -> list[np.ndarray]:
-        """Up to five cells between two distances from a point, apart from each other, the nearest to `best` first."""
-        xy, spots = self.env.ground.xy, list[np.ndarray]()
+    def _spots(
+        self, point: np.ndarray, low: float, high: float, best: float = 0.65, *, to: np.ndarray
+    ) -> list[np.ndarray]:
+        """Up to five cells between two distances from a point, apart from each other; first those from where the arm
+        meets neither walls nor open doors on its way `to` something, the nearest to `best` first."""
+        xy, leaves, spots = self.env.ground.xy, self._leaves(), list[np.ndarray]()
         far = np.linalg.norm(xy - point[:2], axis=1)
-        for cell in np.argsort(np.abs(far - best), kind="stable"):
-            apart = low <= far[cell] <= high and all(math.dist(xy[cell], xy[s[0]]) > 0.25 for s in spots)
-            spots += [np.array([cell])] if apart and len(spots) < 5 else []
+        near = {int(c): self._blocked(xy[c], to, leaves) for c in np.flatnonzero((far >= low) & (far <= high))}
+        for cell in sorted(near, key=lambda c: (near[c], abs(far[c] - best))):
+            if len(spots) < 5 and all(math.dist(xy[cell], xy[s[0]]) > 0.25 for s in spots):
+                spots.append(np.array([cell]))
         return spots
+
+    def _blocked(self, xy: np.ndarray, to: np.ndarray, leaves: list[shapely.LineString]) -> bool:
+        """True if the base meets open doors at a place, or an arm from there meets them or anything else."""
+        away, line = to - (*xy, to[2]), shapely.linestrings([xy, to[:2]])
+        metres, body, geom = float(np.linalg.norm(away)), self.env.body, np.zeros(1, np.int32)
+        start = np.array([*xy, to[2] + 0.02])
+        met = mujoco.mj_ray(body.model, body.data, start, away / metres, None, 1, body.root, geom)
+        at = shapely.Point(xy)
+        shell = met >= 0 and body.model.geom(geom[0]).name.partition("/")[2].startswith(("wall", "leaf"))
+        if 0 <= met < metres - 0.3 * (not shell):
+            return True
+        return any(x.distance(at) < CLEAR or x.distance(line) < 0.06 for x in leaves)
+
+    def _leaves(self) -> list[shapely.LineString]:
+        """Where doors of furniture stand that are open, from hinge to handle, metres."""
+        body, lines = self.env.body, list[shapely.LineString]()
+        for part in (n for n, x in self.env.openness.items() if "/" in n and x > SHUT):
+            if (handle := body.handles.get(part.replace("/", "_"))) is not None:
+                joint = body.model.body_jntadr[body.model.body_parentid[handle]]
+                if self._way(handle)[1].any():
+                    lines.append(shapely.LineString([body.data.xanchor[joint][:2], body.data.xipos[handle][:2]]))
+        return lines
 
     def _reach(self, cells: np.ndarray, point: np.ndarray, above: float = 0.0) -> bool:
         """Drive to a cell, face a point and bring the hand there, or first so far above it, metres."""
