@@ -102,6 +102,7 @@ class World:
         self._watcher: Renderer | None = None
         self._states: dict[tuple[tuple[str, float], ...], Self] = {}
         self._lamps: tuple[tuple[bool, ...], Mapping[str, str]] = (), {}
+        self._lit_for: tuple[set[str], Mapping[str, bool]] = set(), {}
         self._recent = functools.lru_cache(maxsize=PANORAMAS_KEPT)(self._load)
 
     @property
@@ -174,10 +175,11 @@ class World:
             raise ValueError(f"body {name!r} needs a name of its own, and lit pictures: unlit ones show no bodies")
         self._bodies[name] = tuple(dataclasses.replace(p, owner=name) for p in parts)
 
-    def follow(self, model: mujoco.MjModel, data: mujoco.MjData, *, slack: float = SLACK) -> None:
+    def follow(self, model: mujoco.MjModel, data: mujoco.MjData, *, slack: float = SLACK, shadows: bool = True) -> None:
         """Show the bodies of a MuJoCo model as they are now: a robot that was attached to the house's own model, or one
         alone. Call it again after the physics; bodies named as placements of the house move these, and doors on hinges
-        the house's doors, once they are SETTLED away from where they were shown; `slack` as of `show`."""
+        the house's doors, once they are SETTLED away from where they were shown; `slack` as of `show`; without
+        `shadows` the robot takes light and hides none, which takes less time."""
         import mujoco  # late, as these: they read meshes by trimesh
 
         from embodied.scene.bodies import body_name, body_parts, body_poses
@@ -193,15 +195,20 @@ class World:
             mujoco.mj_forward(model, rest)
             free = sorted({model.body(b).name for b in model.jnt_bodyid[model.jnt_type == 0]} & {*things})
             self._followed, self._resting = model, (openness(model, rest), body_poses(model, rest, things), free)
+            self._last: tuple[Mapping[str, RigidPose], Mapping[str, RigidPose]] = {}, {}
         shut, rests, free = self._resting
         poses = body_poses(model, data, (*self._bodies, *free))
         bodies = {name: pose for name, pose in poses.items() if name in self._bodies}
-        moved = {i: poses[i] for i in free if poses[i].apart(before.moved.get(i, rests[i])) > SETTLED}
+        last, known = self._last
+        anew = [i for i in free if before.moved is not known or poses[i] != last.get(i)]  # most things sleep
+        moved = {**before.moved}
+        moved |= {i: poses[i] for i in anew if poses[i].apart(before.moved.get(i, rests[i])) > SETTLED}
+        self._last = poses, moved
         ways = openness(model, data)
         opened = {i: x for i, x in ways.items() if abs(x - before.openness.get(i, shut[i])) > SETTLED}
-        now = {"moved": {**before.moved, **moved}, "openness": {**before.openness, **opened}, "bodies": bodies}
+        now = {"moved": moved, "openness": {**before.openness, **opened}, "bodies": bodies}
         self._moments[-1] = dataclasses.replace(before, **now)  # type: ignore[arg-type]
-        self._bring_up_to_date(slack=slack)
+        self._bring_up_to_date(slack, shadows)
 
     def show(self, moment: Moment, *, slack: float = 0.0) -> None:
         """Bring the house to a moment, in all that is drawn from now on.
@@ -279,7 +286,7 @@ class World:
                 self._states.pop(next(iter(self._states))).close()
         return self._states[state]
 
-    def _bring_up_to_date(self, slack: float = 0.0) -> None:
+    def _bring_up_to_date(self, slack: float = 0.0, shadows: bool = True) -> None:
         """Draw the moment from now on."""
         self._recent.cache_clear()
         for name in ("_poses", "parts", "shown", "owners", "_classes"):
@@ -296,7 +303,7 @@ class World:
         for name, parts in self._bodies.items():
             moving.add(name, parts)
         anew = fresh or moving.needs(self.moment)
-        drawn = moving.show(self.moment, slack=slack)
+        drawn = moving.show(self.moment, slack=slack, shadows=shadows)
         patches = [(p.page, p.row, p.column, p.picture) for p in drawn.patches]
         if anew:
             overlay = gloss_of(moving.bake, moving=moving) if _reflects(self.pictures) else None
@@ -310,7 +317,11 @@ class World:
         from embodied.light.gather import carried_lamps
         from embodied.light.moving import MovingHouse
 
+        moved = {*self.moment.moved}, self.moment.lamps
+        if self._moving is not None and moved == self._lit_for:
+            return False
         carriers = carried_lamps(self.house, self.moment)
+        self._lit_for = moved
         lamps = tuple(x.on for x in self.moment.switched(self.house).lights), carriers
         if self._moving is not None and lamps == self._lamps:
             return False

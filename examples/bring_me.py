@@ -46,6 +46,21 @@ class Search:
     held: str = ""
     confirming: bool = False
 
+    def notice(self, o: Observation) -> None:
+        """Take in what was said since."""
+        reply = o.instruction.partition(" . ")[2]
+        if self.confirming and reply.startswith("No,"):
+            self.denied.add(self.held)
+        self.told = {*self.told, reply} if o.extras.holds == self.held else set()
+        self.held, self.confirming = o.extras.holds, False
+
+    def choose(self, o: Observation, word: str) -> Action:
+        """The action of a word, or of 'ask QUESTION'."""
+        self.done[word, self.held] += 1
+        verb, _, what = word.partition(" ")
+        self.confirming = word == f"ask {Intention.CONFIRM.value}"
+        return Ask(Intention(what)) if verb == "ask" else Move(o.candidates.words.index(word))
+
 
 class Searcher:
     """Goes through the rooms until something that the request fits is in sight, takes it, and looks for the person; in
@@ -64,23 +79,22 @@ class Searcher:
         return [None if o is None else self._act(o, m, r) for o, m, r in zip(observations, memory, rngs)], memory
 
     def _act(self, o: Observation, m: Search, rng: np.random.Generator) -> Action:
-        holds = o.extras.holds
-        request, _, reply = o.instruction.partition(" . ")
-        if m.confirming and reply.startswith("No,"):
-            m.denied.add(m.held)
-        m.told = {*m.told, reply} if holds == m.held else set()
-        m.held, m.confirming = holds, False
-        for question in self._questions:
-            wanted = question is Intention.REGION or (question is Intention.CONFIRM) == bool(holds)
-            if wanted and question in o.can_ask and not m.done[question.value, holds]:
-                m.done[question.value, holds] += 1
-                m.confirming = question is Intention.CONFIRM
-                return Ask(question)
-        word = self._word(o, m, request.removeprefix("bring me the "), rng)
-        m.done[word, holds] += 1
-        return Move(o.candidates.words.index(word))
+        m.notice(o)
+        left = self.choices(o, m)
+        return m.choose(o, left[int(rng.integers(len(left)))])
 
-    def _word(self, o: Observation, m: Search, noun: str, rng: np.random.Generator) -> str:
+    def choices(self, o: Observation, m: Search) -> list[str]:
+        """Words that are equally good now."""
+        for question in self._questions:
+            wanted, word = (
+                question is Intention.REGION or (question is Intention.CONFIRM) == bool(m.held),
+                question.value,
+            )
+            if wanted and question in o.can_ask and not m.done[f"ask {word}", m.held]:
+                return [f"ask {word}"]
+        return self._words(o, m, o.instruction.partition(" . ")[0].removeprefix("bring me the "))
+
+    def _words(self, o: Observation, m: Search, noun: str) -> list[str]:
         words, seen, holds, told = o.candidates.words, o.extras.sees, o.extras.holds, " ".join(sorted(m.told))
         rooms, furniture = IN_ROOM.findall(told), [f" of the {x}," for x in INSIDE.findall(told)]
         fits = lambda name: not self._sees or seen[name].startswith(f"{noun},")
@@ -101,7 +115,7 @@ class Searcher:
             left = [w for w in named if m.done[w, holds] < 2 * TRIES] or places
             least = min(m.done[w, holds] for w in left)
             left = [w for w in left if m.done[w, holds] == least]
-        return left[int(rng.integers(len(left)))]
+        return left
 
 
 class AnyWord:

@@ -7,6 +7,7 @@ import math
 from types import SimpleNamespace
 from unittest.mock import Mock
 
+import cv2
 import mujoco
 import numpy as np
 import pytest
@@ -182,6 +183,24 @@ def test_a_body_that_the_moment_does_not_have_any_more_is_not_drawn_and_leaves_n
     world.show(Moment(bodies={"cube": far}))
     np.testing.assert_array_equal(world.camera(*eye).rgb, without)
     world.show(Moment())
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_a_robot_without_shadows_leaves_the_house_around_it_as_it_was(world):
+    plate = "<body name='plate'><geom type='box' size='.5 .5 .02' rgba='.1 .1 .1 1'/></body>"
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{plate}</worldbody></mujoco>")
+    data, views = mujoco.MjData(model), []
+    for place, shadows in (((8.5, 0.5, 0.1), True), ((1.5, 2.4, 0.25), False), ((1.5, 2.4, 0.25), True)):
+        model.body("plate").pos = place
+        mujoco.mj_forward(model, data)
+        world.follow(model, data, shadows=shadows)
+        views.append(world.camera((1.5, 3.6, 0.2), -math.pi / 2, -0.1, 1.4, (96, 128)))
+    world.show(Moment())
+    around = cv2.erode((views[0].ids == views[1].ids).astype(np.uint8), np.ones((5, 5))) > 0  # edges are mixed
+    assert 0.2 < around.mean() < 1
+    np.testing.assert_array_equal(views[1].rgb[around], views[0].rgb[around])
+    assert (views[2].rgb[around] != views[0].rgb[around]).any()
 
 
 @pytest.mark.slow

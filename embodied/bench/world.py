@@ -287,17 +287,20 @@ def robots(catalogue: Catalogue, cache: Path, seed: int, pictures: str) -> Itera
     """Steps of Robot-v0, a tenth of a second each, of a robot that drives and waves two arms before its eyes."""
     with one_core(), open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, pictures=pictures) as world:
         rate = functools.partial(measure, unit="1/s", per=DRIVE_STEPS, clock=time.process_time)
-        for seen in ((), *(channels for _, channels, _ in LINES[:2])):
-            settings = RobotSettings(two_arms(), f"link_1_{ARM - 1}", "pick", observations=seen)
+        every = [((), True), (("rgb",), False), *((channels, True) for _, channels, _ in LINES[:2])]
+        for seen, shadows in every:
+            settings = RobotSettings(two_arms(), f"link_1_{ARM - 1}", "pick", observations=seen, shadows=shadows)
             env = RobotEnv({world.name: world}, settings)
             env.reset(seed=seed)
-            name = f"robot of {2 * ARM} joints, {' and '.join(seen) or 'without pictures'}, 128 x 128"
+            shown = " and ".join(seen) + ("" if shadows else " without its shadow") or "without pictures"
+            name = f"robot of {2 * ARM} joints, {shown}, 128 x 128"
             yield rate(name, functools.partial(_wave, env))
 
 
 def two_arms() -> mujoco.MjSpec:
     """A cart with a mast, a camera and two arms of ARM hinges, all driven."""
     spec, kinds = mujoco.MjSpec(), mujoco.mjtGeom
+    spec.option.timestep = 0.004
     cart = spec.worldbody.add_body(name="cart")
     cart.add_geom(type=kinds.mjGEOM_BOX, size=[0.2, 0.18, 0.15], pos=[0, 0, 0.18], mass=40)
     cart.add_geom(type=kinds.mjGEOM_CYLINDER, size=[0.05, 0.35, 0], pos=[0, 0, 0.65], mass=5)

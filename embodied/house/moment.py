@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -45,7 +46,8 @@ class RigidPose:
     @functools.cached_property
     def rotation(self) -> np.ndarray:
         """(3, 3) from the thing's frame to the world's."""
-        w, x, y, z = np.asarray(self.quat) / np.linalg.norm(self.quat)
+        norm = math.hypot(*self.quat)
+        w, x, y, z = (a / norm for a in self.quat)
         return np.array(
             [
                 [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -61,7 +63,7 @@ class RigidPose:
 
     def apart(self, other: RigidPose) -> float:
         """Metres between two poses, or a third of the radians between their orientations where that is more."""
-        cos = abs(float(np.dot(self.quat, other.quat)))
+        cos = abs(sum(map(operator.mul, self.quat, other.quat)))
         angle = 2 * math.acos(min(cos, 1.0)) if cos < 1 - 1e-12 else 0.0
         return max(math.dist(self.position, other.position), angle / 3)
 
@@ -138,7 +140,7 @@ class Moment:
             raise ValueError(f"there are no people {unknown}; embodied.assets.people.people() has {sorted(people())}")
         places = {name: figure.place for name, figure in self.people.items()}
         for name, pose in {**self.moved, **self.bodies, **places}.items():
-            if not np.isfinite((*pose.position, *pose.quat)).all() or not any(pose.quat):
+            if not all(map(math.isfinite, (*pose.position, *pose.quat))) or not any(pose.quat):
                 raise ValueError(f"{name!r} needs 3 finite metres and a quaternion w x y z, got {pose}")
 
     def open_parts(self, house: House) -> dict[str, dict[str, float]]:

@@ -96,7 +96,8 @@ class MovingHouse:
 
     def add(self, name: str, parts: Sequence[Part]) -> None:
         """Tell of a body that is no part of the house, in its own frame; it is drawn where `Moment.bodies` says."""
-        self._extra[name] = tuple(dataclasses.replace(p, owner=p.owner or name) for p in parts)
+        if name not in self._things:
+            self._extra[name] = tuple(dataclasses.replace(p, owner=p.owner or name) for p in parts)
 
     def needs(self, moment: Moment) -> bool:
         """True where `show` will change which meshes there are, and with them `lit`."""
@@ -123,12 +124,13 @@ class MovingHouse:
     def _apart(self, thing: str) -> TakenApart | None:
         return apart(self.catalogue.mesh, self.house.placement_by_id[thing])
 
-    def show(self, moment: Moment, *, slack: float = 0.0) -> SceneChange:
+    def show(self, moment: Moment, *, slack: float = 0.0, shadows: bool = True) -> SceneChange:
         """Bring everything to a moment.
 
         Args:
           slack: metres, and thrice as many radians, that a thing may have moved since its light was computed, to keep
             it.
+          shadows: without, bodies hide no light from the house and send none back.
 
         Raises:
           ValueError: the moment is none of this house.
@@ -161,9 +163,12 @@ class MovingHouse:
                 if known is None or new_light or (known.lit_at.apart(pose) > slack and not is_person):
                     unlit[name] = thing.surface, pose
                 elif known.pose != pose and not is_person:
-                    self._placed[name] = dataclasses.replace(known, pose=pose)
+                    self._placed[name] = Placed(known.surface, pose, known.lit_at, known.e)
         self._placed |= self._lit_at(unlit)
-        return SceneChange(self._corners(), (*self._own_patches(), *self.pages.changed(self._groups(), slack)))
+        groups = self._groups()
+        if not shadows:
+            groups.pop(BODIES, None)
+        return SceneChange(self._corners(), (*self._own_patches(), *self.pages.changed(groups, slack)))
 
     # ------------------------------------------------------------------ things
 
