@@ -36,7 +36,7 @@ from embodied.seeds import stream
 
 QUESTIONS = (Intention.REGION, Intention.APPEARANCE, Intention.CONFIRM)
 VERBS = ("go", "open", "take", "give", "leave", *(f"ask {q.value}" for q in QUESTIONS))
-PIXELS, CLOSER, WORDS, FACTS, PLACES = 96, math.radians(14), 1024, 25, 40
+PIXELS, CLOSER, WORDS, FACTS, PLACES = 96, math.radians(14), 1024, 23, 40
 """Side of a picture; its field of view; rows of the table of words; numbers that `facts` gives of a choice; and places
 of a house at which the teacher is asked for what is in sight, besides its episodes."""
 
