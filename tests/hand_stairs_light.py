@@ -11,6 +11,7 @@ import numpy as np
 
 from embodied.assets.cache import default_cache, write_json
 from embodied.assets.catalogue import load_catalogue
+from embodied.bench import light
 from embodied.bench.light import VIEW_ANGLE, psnr
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
@@ -38,20 +39,20 @@ def views(house: House) -> list[tuple[str, np.ndarray, np.ndarray]]:
     shown += [
         ("gallery" if stair.void else "stairs", *pair) for pair in ((head, opening), (foot, middle), (head, middle))
     ]
-    for room in house.rooms:
-        nodes = [p for p, r in zip(graph.positions, graph.room_of_node, strict=True) if r == room.id]
-        panes = [o for o in house.openings if o.kind == "roof_window" and o.rooms[0] == room.id]
-        for eye in nodes[:2]:
-            to = np.append(np.mean([panes[0].a, panes[0].b], axis=0), eye[2]) if panes else nodes[-1] - (0, 0, 0.2)
-            if panes:
-                shown += [("attic", eye, to), ("attic", eye, 2 * eye - to)]
-            elif not room.slopes and room.kind != "stairwell":
-                shown += [("other rooms", eye, to), ("other rooms", eye, 2 * eye - to)]
+    for name, eye, yaw in light.viewpoints(house, ("stairwell",) * 9):
+        room = house.room_by_id[name]
+        ahead = eye + (math.cos(yaw), math.sin(yaw), -0.1)
+        shown += [("under the roof" if room.slopes else "other rooms", eye, ahead)] * (room.kind != "stairwell")
+    for o in (o for o in house.openings if o.kind == "roof_window"):
+        nodes = [p for p, r in zip(graph.positions, graph.room_of_node, strict=True) if r == o.rooms[0]]
+        middle = np.mean([o.a, o.b], axis=0)
+        eye = max(nodes, key=lambda p: math.dist(p[:2], middle))
+        shown.append(("roof windows", eye, np.append(middle, eye[2])))
     return [v for v in shown if math.dist(v[1][:2], v[2][:2]) > 0.3]
 
 
 def main(first: int, last: int, out: str) -> None:
-    catalogue, rows = load_catalogue(), []
+    catalogue, rows, light.ROOMS_SHOWN = load_catalogue(), [], 20
     for seed in range(first, last):
         config = HouseConfig(area=(112, 122), storeys=2, special=("gallery", "attic"), hour=13, weather="clear")
         house = generate_house(seed, config, catalogue)

@@ -30,6 +30,8 @@ FIXED_FRAME = "#fixed"
 """End of the mesh key of what stays of a window that is open."""
 SASH_STEP = 0.012
 """Metres by which casements stand before their frame."""
+LIP = 0.004
+"""Metres by which casements cover their frame: a slot would be a black hairline."""
 PANE_FINISH = Finish(color=(0.86, 0.93, 0.92, 0.08), roughness=0.02, specular=0.5)
 FITTING_METAL = Finish(color=(0.72, 0.71, 0.69, 1.0), roughness=0.32, metallic=1.0)
 STONE_SILL = Finish(color=(0.78, 0.77, 0.74, 1.0), roughness=0.35)
@@ -191,19 +193,20 @@ def _casements(hole: _Hole, y: float, sashes: Sequence[Sash], materials: dict[st
 
 
 def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tuple[list[Shape], list[Sash]]:
-    """Fixed frame with one to six casements."""
+    """Fixed frame with one to six casements: two meet, and pairs have a post between them."""
     o = hole.opening
     w, z0, z1 = hole.length, o.sill, o.head
     outer, sash = 0.045, 0.055
     count = o.casements
     bars = stream(house.seed, "joinery", "bars").random() < 0.3
     foot = 0.12 if french else sash
-    cells = np.linspace(outer, w - outer, count + 1)
+    cells, gaps = np.linspace(outer, w - outer, count + 1), np.where(np.arange(count + 1) % 2, 0.0, 0.001)
+    gaps[[0, -1]] = -LIP
     sashes: list[Sash] = []
     for i in range(count):
         handles: list[Shape] = []
-        x0, x1 = cells[i] + 0.002, cells[i + 1] - 0.002
-        b0, b1 = z0 + outer + 0.002, z1 - outer - 0.002
+        x0, x1 = cells[i] + gaps[i], cells[i + 1] - gaps[i + 1]
+        b0, b1 = z0 + outer - LIP, z1 - outer + LIP
         boards = frame(x0, x1, b0, b1, (y0 + SASH_STEP, y1 + SASH_STEP), sash, 0.006, foot)
         gx0, gx1 = x0 + sash - 0.006, x1 - sash + 0.006
         gz0, gz1 = b0 + foot - 0.006, b1 - sash + 0.006
@@ -223,7 +226,8 @@ def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tu
             way = [(x, y + 0.008, z), (x, y + 0.035, z), (x, y + 0.042, z - 0.012), (x, y + 0.042, z - 0.11)]
             handles += [box([x - 0.014, y, z - 0.035], [x + 0.014, y + 0.01, z + 0.035], 0.004), tube(way, 0.008, 8)]
         sashes.append((boards, [pane], handles))
-    return frame(0, w, z0, z1, (y0, y1), outer), sashes
+    posts = [box([x - 0.02, y0, z0], [x + 0.02, y1, z1]) for x in cells[2:-1:2]]
+    return [*frame(0, w, z0, z1, (y0, y1), outer), *posts], sashes
 
 
 # ------------------------------------------------------------------ doors

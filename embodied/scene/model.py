@@ -520,6 +520,8 @@ def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part], hung: Mapping[doors.
         leaf = hung.get((part.owner, part.position)) if doors.is_leaf(part) else None
         if leaf is not None:
             box = collision.bounding_box(part.mesh.vertices)
+            if part.owner.endswith("/frame"):  # casements meet in a rebate
+                box = dataclasses.replace(box, half=(box.half[0] - 0.003, *box.half[1:]))
             first = count[part.owner] = count.get(part.owner, len(leaf.body.geoms) - 1) + 1
             _add_boxes(leaf.body, part.owner, [box], density=doors.LEAF_DENSITY, position=leaf.origin, first=first)
         elif part.kind == "opening" and part.owner.endswith(LEAVES):
