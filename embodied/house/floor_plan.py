@@ -400,6 +400,8 @@ def _calm_spot(house: House, room: Room, inside: shapely.Polygon) -> tuple[float
             for x, y in ((x0 + u * (x1 - x0), y0 + v * (y1 - y0)), (x1 - u * (x1 - x0), y1 - v * (y1 - y0))):
                 plate = shapely.box(x - 0.7, y - 0.25, x + 0.7, y + 0.25)
                 cost = 3.0 * plate.intersection(things).area + 0.12 * math.dist((x, y), ((x0 + x1) / 2, (y0 + y1) / 2))
+                if len(room.polygon) > 4:
+                    cost += 9.0 * plate.difference(inside).area
                 if inside.contains(shapely.Point(x, y)) and cost < least - 1e-9:
                     best, least = (float(x), float(y)), cost
     return best
