@@ -111,15 +111,19 @@ class Example:
 class Chooser(nn.Module):
     """Scores of choices: by their facts, and by how well what is seen fits what is asked for."""
 
-    def __init__(self, features: int) -> None:
+    def __init__(self, seen: torch.Tensor) -> None:
+        """`seen`: (n, D) of things, whose mean and deviation become 0 and 1."""
         super().__init__()
+        self.mean, self.deviation = seen.mean(0), seen.std(0) + 1e-6
         self.words = nn.EmbeddingBag(WORDS, 48)
-        self.sight = nn.Sequential(nn.Dropout(0.2), nn.Linear(features, 128), nn.ReLU(), nn.Linear(128, 48))
+        self.sight = nn.Sequential(nn.Dropout(0.3), nn.Linear(seen.shape[1], 48))
         self.choice = nn.Sequential(nn.Linear(FACTS + 1, 64), nn.ReLU(), nn.Linear(64, 1))
 
     def forward(self, e: Example) -> torch.Tensor:
         """(n,)"""
-        fit = (self.sight(e.seen) @ self.words(e.request[None])[0]) * e.facts[:, VERBS.index("take")]
+        fit = (self.sight((e.seen - self.mean) / self.deviation) @ self.words(e.request[None])[0]) * e.facts[
+            :, VERBS.index("take")
+        ]
         return self.choice(torch.cat([e.facts, fit[:, None]], 1))[:, 0]
 
 
@@ -181,7 +185,7 @@ def train(examples: list[Example], blind: bool, passes: int, seed: int) -> Choos
     seen = [dataclasses.replace(e, seen=torch.zeros_like(e.seen)) for e in examples] if blind else examples
     rng = stream(seed, "bring by sight")
     with seeded(seed):
-        network = Chooser(examples[0].seen.shape[1])
+        network = Chooser(torch.cat([e.seen[e.facts[:, VERBS.index("take")] > 0] for e in seen]))
         optimizer = torch.optim.AdamW(network.parameters(), 1e-3, weight_decay=1e-2)
         for _ in range(passes):
             order = rng.permutation(len(seen))
@@ -220,7 +224,7 @@ if __name__ == "__main__":
     parser.add_argument("--train", type=int, nargs=2, default=(700, 710), metavar="SEED")
     parser.add_argument("--judge", type=int, nargs=2, default=(500, 510), metavar="SEED")
     parser.add_argument("--episodes", type=int, default=3)
-    parser.add_argument("--passes", type=int, default=12)
+    parser.add_argument("--passes", type=int, default=8)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--pictures", default="fast-matte")
     parser.add_argument("--out", type=Path)
