@@ -114,6 +114,15 @@ def test_rough_reflections_are_smooth_and_the_same_for_any_size_of_picture():
     assert np.array_equal(out, rough.over(drawn(97), LOOKING_DOWN)), "and the same every time"
 
 
+def test_brushed_metal_shows_a_bright_edge_once_and_not_in_every_direction_of_its_lobe(monkeypatch):
+    steps = lambda: np.abs(
+        np.diff(house(0.3, 1.0, 1.0, (1.0, 0.1)).over(drawn(384), LOOKING_DOWN)[200:, 192, 0].astype(int))
+    ).max()
+    smooth = steps()
+    monkeypatch.setattr(gloss, "BETWEEN", 1e-9)
+    assert smooth < 0.6 * steps()
+
+
 @pytest.mark.parametrize("metal", [0.0, 1.0])
 def test_thin_bars_do_not_flicker_while_the_camera_turns(metal, monkeypatch):
     def flicker() -> float:

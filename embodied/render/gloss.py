@@ -57,6 +57,9 @@ UNDERSAMPLED_RAYS = 8
 """Rays of each of those pixels."""
 BRUSHED = 4
 """Rays of each pixel of polished metal that is not smooth, in each of SUBPIXEL_OFFSETS."""
+BETWEEN = 0.5
+"""Tangent of the angle between two directions in which a picture of polished metal looks, for the square of its
+roughness: the bright edge of a window would show once in each."""
 WHITE = 5.0
 """Light that is shown as full white: no more of it counts where a pixel is averaged, or edges would be ragged."""
 DOUBLE_GLAZING = 0.81
@@ -391,8 +394,10 @@ class Gloss:
         mean = lambda a: np.bincount(which, a, len(pixels))[there] / len(SUBPIXEL_OFFSETS)
         values = np.stack([mean(a) for a in (*lost.T, *np.minimum(mirrored, WHITE).T)], axis=1)
         where, rough = pixels[there], mean(seen.roughness >= SMOOTH) > 0.5
-        if rough.any():
-            values[rough] = evened(values[rough], where[rough], rgb.shape[:2])
+        focal = rgb.shape[0] / (2 * math.tan(camera.vfov / 2))
+        apart = np.where(rough, np.ceil(BETWEEN * focal * np.square(mean(seen.roughness))), 0).astype(int)
+        for wide in np.unique(apart[rough]).tolist():
+            values[apart == wide] = evened(values[apart == wide], where[apart == wide], rgb.shape[:2], wide)
         own = light_of(out.reshape(-1, 3)[where])
         out.reshape(-1, 3)[where] = shown_of(own * (1 - values[:, :3]) + values[:, 3:])
 

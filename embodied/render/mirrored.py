@@ -124,13 +124,14 @@ class Mirrored:
         return (self.owner[near] == self.owner[far]) & (cos > CREASE)
 
 
-def evened(values: np.ndarray, pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+def evened(values: np.ndarray, pixels: np.ndarray, size: tuple[int, int], apart: int = 1) -> np.ndarray:
     """(n, k) values of pixels, averaged over those of them around each that look along the other directions of the
-    lobe: FINE_TILE."""
+    lobe, FINE_TILE, and over what lies between two of these directions: `apart` pixels."""
     n = values.shape[1]
     sums = np.zeros((size[0] * size[1], n + 1), np.float32)
     sums[pixels, :n], sums[pixels, n] = values, 1
-    across, down = np.array([0.5, 1, 0.5]), np.array([0.5, 1, 1, 1, 0.5])
+    between = np.convolve(np.ones(apart), np.ones(apart))
+    across, down = (np.convolve(tile, between) for tile in ([0.5, 1, 0.5], [0.5, 1, 1, 1, 0.5]))
     planes = [cv2.sepFilter2D(p, -1, across, down, borderType=cv2.BORDER_CONSTANT) for p in sums.T.reshape(-1, *size)]
     sums = np.stack([p.ravel()[pixels] for p in planes], axis=1)
     return sums[:, :n] / sums[:, n:]
