@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from collections import Counter
 
 import cv2
 import numpy as np
@@ -27,6 +28,7 @@ from embodied.datasets.vqa.scoring import (
     chance,
     cross_judged,
     less_guessed,
+    narrowed,
     score,
     thinned,
 )
@@ -132,11 +134,13 @@ def test_words_that_mislead_are_words_of_things():
     assert {*ASKING["unsaid"]} <= nouns and classes <= {*of.nouns_of}
 
 
-def test_an_open_door_counts_as_seen_where_most_of_it_is_in_view():
-    corners = np.array([[3, y, z] for y in (-0.3, 0.3) for z in (0.9, 1.5)], float)
-    ids = np.full((360, 480), 7)
-    assert shows(ids, 7, hull(corners, (0, 0, 1.5), 0.0)) and not shows(ids, 8, hull(corners, (0, 0, 1.5), 0.0))
-    assert not shows(ids, 7, hull(corners, (0, 0, 1.5), math.pi)) and not shows(ids, 7, hull(corners, (0, 0, 6), 0.0))
+def test_an_open_door_counts_as_seen_where_it_is_in_view_and_not_where_it_is_when_shut():
+    corners, ids = np.array([[3, y, z] for y in (-0.3, 0.3) for z in (0.9, 1.5)], float), np.full((360, 480), 7)
+    seen = lambda owner, at, yaw=0.0, beside=1.0: shows(
+        ids, owner, hull(corners, at, yaw), hull(corners + (0, beside, 0), at, yaw)
+    )
+    assert seen(7, (0, 0, 1.5)) and not seen(8, (0, 0, 1.5)) and not seen(7, (0, 0, 1.5), beside=0.1)
+    assert not any((seen(7, (0, 0, 1.5), math.pi), seen(7, (0, 0, 6)), seen(7, (2.5, 0, 1.5)), seen(7, (-9, 0, 1.5))))
 
 
 def test_the_same_seed_asks_the_same(hand):
@@ -148,6 +152,30 @@ def test_numbers_are_scored_as_by_vsi_bench():
     choice = VqaQuestion("c", "w", "support", "What?", "mug", ("cup", "mug"))
     assert score(choice, "B.") == 1 and score(choice, "A") == 0 and "A. cup\nB. mug" in choice.prompt
     assert chance([VqaQuestion("c", "w", "support", "What?", "mug", ("cup", "mug"))]) == 0.5
+
+
+def test_each_side_is_right_for_the_same_three_things(hand):
+    sides = dict[tuple[str, ...], set[str]]()
+    for q in hand[1]:
+        if q.type == "object_rel_direction_easy":
+            sides.setdefault(tuple(sorted(q.about)), set()).add(q.answer)
+    assert len(sides) > 3 and all(x == {"left", "right"} for x in sides.values())
+
+
+def test_what_is_offered_is_no_more_often_right_than_chance_has_it():
+    rng, nouns = np.random.default_rng(0), [f"noun{k}" for k in range(20)]
+
+    def asked(k: int) -> VqaQuestion:
+        right = nouns[int(20 * rng.random() ** 3)]  # the first are right most often
+        wrong = [str(n) for n in rng.permutation(nouns) if n != right][:12]
+        about = ("desk_1", f"{right}_1", *(f"{n}_1" for n in wrong))
+        return VqaQuestion(str(k), f"w_{k}_0", "nearest", "Which is nearest?", right, (right, *wrong), about)
+
+    kept = narrowed([asked(k) for k in range(400)], 0)
+    rights, offered = Counter(q.answer for q in kept), Counter(o for q in kept for o in q.options)
+    assert len(kept) > 200 and all(n <= 0.25 * offered[o] + 1.5 for o, n in rights.items())
+    assert all({i[:-2] for i in q.about[1:]} == {*q.options} and q.about[1] == f"{q.answer}_1" for q in kept)
+    assert max(Counter(q.letter for q in kept).values()) - len(kept) / 4 < 1
 
 
 def test_questions_that_can_be_guessed_are_thinned_until_they_cannot():

@@ -5,7 +5,7 @@ import itertools
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from embodied.assets.moving_parts import openness_of
 from embodied.datasets.build import Watch, for_each_unit, make_dataset_house
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.vqa.scene import WalkScene, movable
-from embodied.datasets.vqa.scoring import VqaQuestion, less_guessed, thinned
+from embodied.datasets.vqa.scoring import VqaQuestion, less_guessed, narrowed, thinned
 from embodied.datasets.vqa.types import CHANGE, TYPES
 from embodied.datasets.vqa.walks import TURN, Walk, cameras, film, look_around, tour, view_of
 from embodied.generate import HouseConfig
@@ -81,8 +81,10 @@ def build_vqa(
         write_json(path, dataclasses.asdict(config))
         names = [(split, i) for split, n in config.houses.items() for i in range(n)]
         for_each_unit(film_house, names, (config, folder, cache), workers=workers, watch=watch)
-        for split, n in config.houses.items():
-            every[split] = ask(config, scenes_of(folder, split, n, cache), config.questions[split], workers)
+        scenes = scenes_of([folder / "houses" / "{}_{:04d}".format(*name) for name in names], cache)
+        for split in config.houses:
+            own = [s for s in scenes if s.walk.house.startswith(f"{split}_")]
+            every[split] = ask(config, own, config.questions[split], workers)
         unguessed(config, every, network, workers)
         for split, questions in every.items():
             save_lines(folder / f"questions_{split}.jsonl", questions)
@@ -181,18 +183,17 @@ def free_spot(world: World, p: Placement, others: Sequence[Any], rng: np.random.
     return None
 
 
-def scenes_of(folder: Path, split: str, houses: int, cache: Path) -> list[WalkScene]:
-    """All walks of a split, each with the classes that those of other houses show."""
+def scenes_of(homes: Iterable[Path], cache: Path) -> list[WalkScene]:
+    """All walks through houses, each with what those of other houses show."""
     scenes, catalogue = list[WalkScene](), load_catalogue(cache)
-    for home in (folder / "houses" / f"{split}_{i:04d}" for i in range(houses)):
+    for home in homes:
         house, graph = House.load(home / "house.json"), from_matterport(home / "connectivity.json")
         walks = [from_plain(Walk, read_json(file)) for file in sorted(home.glob("walk_*/walk.json"))]
         now = [stocked(Moment(openness=w.openness).applied(house), catalogue) if w.openness else house for w in walks]
         scenes += [WalkScene(walk, shown, graph, catalogue) for walk, shown in zip(walks, now)]
-    shown = [(s.house.name, name) for s in scenes for name in sorted({p.object_class for p in s.things})]
-    rests = {(s.carrier_of(p), p.object_class) for s in scenes for p in s.house.placements if p.parent is not None}
+    shown = [(s.walk.house, name) for s in scenes for name in sorted({p.object_class for p in s.things})]
     for scene in scenes:
-        scene.elsewhere, scene.rests = [name for house_name, name in shown if house_name != scene.house.name], rests
+        scene.elsewhere = [name for house, name in shown if house != scene.walk.house]
     return scenes
 
 
@@ -206,8 +207,9 @@ def ask(config: VqaConfig, scenes: Sequence[WalkScene], wanted: int, workers: in
 def unguessed(config: VqaConfig, left: dict[str, list[VqaQuestion]], network: Judge, workers: int) -> None:
     """Leave out what blind models guess that know the questions about other houses; keep as many of each type as there
     are, up to a number that all types of a split share."""
+    of_type = [[q for questions in left.values() for q in questions if q.type == name] for name in TYPES]
+    of_type = joblib.Parallel(n_jobs=workers)(joblib.delayed(narrowed)(qs, config.seed) for qs in of_type)
     for judge in (network, network, None):  # what is left out may keep models from guessing the rest
-        of_type = [[q for questions in left.values() for q in questions if q.type == name] for name in TYPES]
         kept = joblib.Parallel(n_jobs=workers)(joblib.delayed(thinned)(qs, config.seed) for qs in of_type)
         if judge:
             of_id = dict(zip((q.id for qs in kept for q in qs), judge([q for qs in kept for q in qs], config.seed).T))
@@ -218,6 +220,7 @@ def unguessed(config: VqaConfig, left: dict[str, list[VqaQuestion]], network: Ju
             level = max(n for n in range(max(map(len, own)) + 1) if sum(min(len(qs), n) for qs in own) <= most)
             rng = stream(config.seed, "kept", split)
             left[split] = [qs[i] for qs in own for i in sorted(rng.permutation(len(qs))[:level].tolist())]
+        of_type = [[q for questions in left.values() for q in questions if q.type == name] for name in TYPES]
 
 
 def asked_about(scene: WalkScene, most: int, seed: int) -> list[VqaQuestion]:

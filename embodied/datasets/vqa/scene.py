@@ -41,13 +41,12 @@ class WalkScene:
     """All that questions about a walk rest on, and who asks: `by` draws from `rng`.
 
     `clear`, `glimpsed`: what is seen clearly, and perhaps, to the first frame that shows it; `rooms`: those that kind
-    and storey tell from all others; `elsewhere` and `rests`: classes that walks through other houses show, and pairs of
-    a class and what rests on it somewhere.
+    and storey tell from all others; `elsewhere`: classes that walks through other houses show.
     """
 
     def __init__(self, walk: Walk, house: House, graph: NavGraph, catalogue: Catalogue) -> None:
         self.walk, self.house, self.graph = walk, house, graph
-        self.elsewhere, self.rests = list[str](), set[tuple[str, str]]()
+        self.elsewhere: list[str] = []
         self.lexicon, self.assets = lexicon_of(catalogue), {p.id: catalogue.assets[p.asset] for p in house.placements}
         self.kind, self.by, self.rng = "", templates.SPEAKERS[0], np.random.default_rng(0)
         self._called: dict[str, list[Placement]] = {}
@@ -69,10 +68,11 @@ class WalkScene:
         return scene
 
     def ask(self, answer: str, about: Iterable[str], others: Any = (), fact: str = "", **slots: str) -> VqaQuestion:
-        """A question in words. `others` are wrong options, none for a number; `slots` fill the template."""
+        """A question in words. `others` are wrong options, none for a number, or more than are asked (`narrowed`); if
+        they have ids, those are last in `about`. `slots` fill the template."""
         templates = [*ASKING[self.kind][""], *ASKING[self.kind].get(self.by.habit, ())]
         text = templates[int(self.rng.integers(len(templates)))].format(**slots)
-        options = tuple(self.shuffled([answer, *others])) if others else ()
+        options = (answer, *others) if others else ()
         text, about = text[0].upper() + text[1:], tuple(about)
         return VqaQuestion("", self.walk.name, self.kind, text, answer, options, about, fact)
 

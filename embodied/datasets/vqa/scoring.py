@@ -10,7 +10,7 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -18,7 +18,9 @@ from scipy.sparse.linalg import lsqr
 
 from embodied.seeds import stream
 
-LETTERS = "ABCDE"
+LETTERS, OPTIONS, ALONE = "ABCDE", 4, (0.7, 1.5)
+"""Most options of a question; by how many times more often than chance has it one may be right, in all questions of a
+type, or in those about a kind of thing."""
 NEAR_CHANCE, MOST_ALIKE, FEWEST_LEFT = 0.03, 1 / 2, 12
 """How far above chance a blind model may be; most questions of a type with one number; fewest of a type."""
 BLIND = ("majority", "prior", "classifier")
@@ -121,6 +123,41 @@ def _words(model: str, questions: Questions) -> csr_array:
             rows.append(sorted({zlib.crc32(w.encode()) % HASHED for w in words}))
     ends = np.cumsum([0, *map(len, rows)])
     return csr_array((np.ones(ends[-1]), np.array([*itertools.chain(*rows)], int), ends), shape=(len(rows), HASHED))
+
+
+def narrowed(questions: Questions, seed: int) -> list[VqaQuestion]:
+    """Questions of one type, whose first option is right, with OPTIONS each, and each letter right equally often. Where
+    there are more, some are chosen, and questions left out, such that what is offered about a kind of thing is wrong
+    three times as often as it is right, or more often."""
+    left = [questions[i] for i in stream(seed, "narrowed").permutation(len(questions))]
+    cells, chosen, before = {q.id: _cells(q) for q in questions}, dict[str, list[int]](), 0
+    while len(left) != before:
+        before, rights, wrongs = len(left), Counter(cells[q.id][0] for q in left), Counter[tuple[str, str]]()
+        for q in left:
+            wanted = [(3 * rights[c] - wrongs[c]) / (rights[c] + 1) for c in cells[q.id]]
+            chosen[q.id] = sorted(range(1, len(q.options)), key=lambda i: -wanted[i])[: OPTIONS - 1]
+            wrongs.update(cells[q.id][i] for i in chosen[q.id])
+        if max(map(len, cells.values())) > OPTIONS:
+            over = {c: math.ceil((n - wrongs[c] / 3 - ALONE[c[0] > ""]) / 2) for c, n in rights.items()}
+            place = Counter[tuple[str, str]]()
+            ranks = [place.update([c := cells[q.id][0]]) or place[c] for q in left]
+            left = [q for q, rank in zip(left, ranks) if rank > over[cells[q.id][0]]]
+    out = []
+    for k, q in enumerate(left):
+        options = [q.options[i] for i in stream(seed, "options", q.id).permutation(chosen[q.id]).tolist()]
+        if q.options:
+            options.insert(k % (len(options) + 1), q.answer)
+        fixed = len(q.about) - len(q.options) + 1
+        about = [n for i, n in enumerate(q.about) if fixed < 1 or i < fixed or i - fixed + 1 in chosen[q.id]]
+        out.append(replace(q, options=tuple(options), about=tuple(about)))
+    return sorted(out, key=lambda q: q.id)
+
+
+def _cells(q: VqaQuestion) -> list[tuple[str, str]]:
+    """The kind of thing that a question is about, and that of each option, by their ids or the words of the option."""
+    fixed, kind = len(q.about) - len(q.options) + 1, lambda i: i.rpartition("_")[0]
+    kinds = [kind(i) for i in q.about[fixed - 1 :]] if fixed > 0 else q.options
+    return [(kind(q.about[0]) if len(q.about) > 1 else "", k) for k in kinds] or [("", "")]
 
 
 def balanced(questions: Questions, seed: int) -> list[VqaQuestion]:

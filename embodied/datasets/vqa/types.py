@@ -14,7 +14,7 @@ import shapely
 
 from embodied.assets.moving_parts import openness_of
 from embodied.datasets.vqa.scene import ALIKE, ASKING, WalkScene, bearing, direction, gap, middle
-from embodied.datasets.vqa.scoring import VqaQuestion
+from embodied.datasets.vqa.scoring import OPTIONS, VqaQuestion
 from embodied.datasets.vqa.walks import CLEAR_SHARE
 from embodied.geometry import facing_of
 from embodied.house.house import HINGED, Placement
@@ -37,6 +37,8 @@ the sun, the sine; hours that are asked about."""
 STANDS, CORNER, STRAIGHT, ROUTES = 1.2, 60.0, 25.0, 400
 """Metres within which one is at a thing; degrees from which a bend of a way is a turn, and below which it is none;
 ways of a walk that are looked at."""
+FACED, TRIPLES, OFFERED = 1.0, 200, 24
+"""Least metres to what is faced; groups of three things that are looked at; most wrong options to choose from."""
 Sides = dict[str, tuple[float, float]]
 """Degrees to the left, from and to."""
 TWO_SIDES: Sides = {"left": (0, 180), "right": (-180, 0)}
@@ -47,13 +49,12 @@ Asked = Iterator[VqaQuestion]
 QuestionType = Callable[[WalkScene], Asked]
 
 
-def groups(s: WalkScene, n: int, far: float = 0.0) -> Iterator[list[tuple[Placement, str]]]:
-    """Things of one room with names, in groups of n, each at least `far` metres from the first."""
+def groups(s: WalkScene, most: int, least: int = 2) -> Iterator[list[tuple[Placement, str]]]:
+    """Things of one room with names, in groups."""
     for room in s.shuffled(s.looked_at):
         things = s.named(s.in_room(room))
-        for k, first in enumerate(things):
-            rest = [t for t in (*things[k + 1 :], *things[:k]) if math.dist(middle(first[0]), middle(t[0])) >= far]
-            yield from [[first, *rest[: n - 1]]] * (len(rest) >= n - 1)
+        for k in range(len(things) if len(things) >= least else 0):
+            yield [*things[k:], *things[:k]][:most]
 
 
 def side_of(angle: float, sides: Sides) -> str | None:
@@ -87,10 +88,13 @@ def distance(s: WalkScene) -> Asked:
 
 
 def nearest(s: WalkScene) -> Asked:
-    for (a, first), *others in groups(s, 5):
+    """Not always for the nearest of all things, but for the nearest of those that are offered."""
+    for (a, first), *others in groups(s, 2 + OFFERED, least=1 + OPTIONS):
         metres, ids, names = zip(*sorted((gap(a, p), p.id, name) for p, name in others))
-        if metres[1] > max(NEARER * metres[0], metres[0] + NEARER_METRES):
-            yield s.ask(names[0], (a.id, *ids), names[1:], ", ".join(f"{d:.1f} m" for d in metres), a=first)
+        for k in s.shuffled(range(len(ids) - OPTIONS + 1))[:2]:
+            if metres[k + 1] > max(NEARER * metres[k], metres[k] + NEARER_METRES):
+                fact = f"{metres[k]:.1f} m, others at least {metres[k + 1]:.1f} m"
+                yield s.ask(names[k], (a.id, *ids[k:]), names[k + 1 :], fact, a=first)
 
 
 def size(s: WalkScene) -> Asked:
@@ -106,9 +110,17 @@ def turned(sides: Sides) -> QuestionType:
     """The type that asks on which side something lies for who stands by a thing and faces another."""
 
     def asked(s: WalkScene) -> Asked:
-        for (a, first), (b, second), (c, third) in itertools.chain(*(groups(s, 3, far=1.0) for _ in range(TRIES))):
-            angle = bearing(middle(a), direction(middle(a), middle(b)), middle(c))
-            yield from sided(s, angle, sides, (a.id, b.id, c.id), a=first, b=second, c=third)
+        """A question for each side, all with the same three things."""
+        things = [s.named(s.in_room(room)) for room in s.looked_at]
+        every = s.shuffled([three for of_room in things for three in itertools.combinations(of_room, 3)])
+        for three in every[:TRIPLES]:
+            questions = dict[str, VqaQuestion]()
+            for (a, first), (b, second), (c, third) in s.shuffled([*itertools.permutations(three)]):
+                if min(math.dist(middle(a), middle(t)) for t in (b, c)) > FACED:
+                    angle = bearing(middle(a), direction(middle(a), middle(b)), middle(c))
+                    asked = sided(s, angle, sides, (a.id, b.id, c.id), a=first, b=second, c=third)
+                    questions |= {q.answer: q for q in asked}
+            yield from questions.values() if len(questions) == len(sides) else ()
 
     return asked
 
@@ -137,12 +149,11 @@ def visibility(s: WalkScene) -> Asked:
     unseen = [n for n in s.elsewhere if n in known and not shown & {p.id for p in s.called(away[n])}]
     often = Counter(s.elsewhere)
     for name in s.shuffled(sorted({p.object_class for p in s.things})):
-        seen, rarer = [p.id for p in s.things if p.object_class == name], int(s.rng.integers(4))
-        others = [*dict.fromkeys(s.shuffled(unseen))]
-        rare, common = ([n for n in others if (often[n] < often[name]) == is_rare] for is_rare in (True, False))
-        wrong = [away[n] for n in (*rare[:rarer], *common[: 3 - rarer])]
-        if len(wrong) == 3:
-            yield s.ask(s.noun(name), seen, wrong, f"first in frame {min(s.clear[i] for i in seen)}")
+        seen = [p.id for p in s.things if p.object_class == name]
+        others = sorted(dict.fromkeys(s.shuffled(unseen)), key=lambda n: abs(often[n] - often[name]))[:OFFERED]
+        if len(others) >= OPTIONS - 1:
+            fact = f"first in frame {min(s.clear[i] for i in seen)}"
+            yield s.ask(s.noun(name), seen[:1], [away[n] for n in others], fact)
 
 
 def carried(shelf: bool) -> QuestionType:
@@ -158,8 +169,7 @@ def carried(shelf: bool) -> QuestionType:
             beside = {p.object_class for p in small if gap(carrier, p) < NEXT_TO}
             away = {p.object_class for p in small} - alike - beside
             for p in s.shuffled(there) if len(away) > 2 else ():
-                fits = [c for c in s.shuffled(sorted(away)) if (s.carrier_of(p), c) in s.rests]
-                wrong = [*dict.fromkeys([*fits, *s.shuffled(sorted(away))])][:3]
+                wrong = s.shuffled(sorted(away))[:OFFERED]
                 fact = f"on it: {', '.join(sorted(classes))}"
                 yield s.ask(s.noun(p.object_class), (carrier.id, p.id), map(s.noun, wrong), fact, a=name)
 
@@ -169,7 +179,7 @@ def carried(shelf: bool) -> QuestionType:
 def openness(s: WalkScene) -> Asked:
     wide, ajar = {p.id: openness_of(p.params) for p in s.openable}, {i for f in s.walk.frames for i in f.ajar}
     for p, name in s.named(TRIES * [p for p in s.openable if p.id in ajar]):
-        wrong = s.named([q for q in s.openable if not wide[q.id]])[:3]
+        wrong = s.named([q for q in s.openable if not wide[q.id]])[: s.rng.integers(1, OPTIONS)]
         if wrong:
             about = (p.id, *sorted(q.id for q, _ in wrong))
             yield s.ask(name, about, [n for _, n in wrong], f"open by {max(wide[p.id].values()):.2f}")
@@ -196,7 +206,7 @@ def seen_by(s: WalkScene) -> Asked:
     for p, name in s.people():
         here, seen = s.in_room(p.room), s.walk.views.get(p.id, {})
         behind = [t for t in here if t.id not in seen and abs(bearing(middle(p), facing_of(p.yaw), middle(t))) > BEHIND]
-        wrong = s.named(behind)[:3]
+        wrong = s.named(behind)[:OFFERED]
         for t, right in s.named([t for t in here if seen.get(t.id, 0.0) > CLEAR_SHARE])[: len(wrong) > 1]:
             yield s.ask(right, (p.id, t.id, *(q.id for q, _ in wrong)), [n for _, n in wrong], a=name)
 

@@ -1,8 +1,9 @@
 """Walks through a house for questions about it: where the camera goes, and how much of what each frame shows."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -10,6 +11,7 @@ import numpy as np
 import shapely
 
 from embodied.assets.cache import write_bytes
+from embodied.assets.catalogue import Catalogue
 from embodied.assets.decoding import read_picture
 from embodied.assets.moving_parts import openness_of
 from embodied.geometry import facing_of, rectangle, wrap
@@ -30,8 +32,9 @@ and at least WHOLE of the outline of its box shows it. With less than GLIMPSE in
 question is about what lies between."""
 EYES = 0.93
 """Height of people's eyes, of their height as they stand or sit."""
-AJAR, MOSTLY, OPEN_KINDS = 0.3, 0.4, ("door", "flap", "drawer")
-"""Openness from which a door or drawer stands open, and the share of it that must be in view."""
+AJAR, MOSTLY, APART, OPEN_SHARES, OPEN_KINDS = 0.3, 0.4, 0.7, (0.006, 0.35), ("door", "flap", "drawer")
+"""Openness from which a door or drawer stands open; the share of its outline that shows it, at least, and that is where
+it is when shut, at most; the outline's least and most share of a frame."""
 Camera = tuple[np.ndarray, float]
 """(3,) position, metres, and yaw, radians."""
 
@@ -113,9 +116,9 @@ def view_of(world: World, person: Placement) -> dict[str, float]:
 def film(world: World, track: Sequence[Camera], folder: Path, first: int = 0) -> Iterator[WalkFrame]:
     """Draw frames of a walk into `folder`, from number `first`: NNN.jpg, and NNN.png with instance ids of 16 bits."""
     things = {p.id: p for p in world.moment.applied(world.house).placements}
-    parts, number = [*ajar_parts(world)], {name: i for i, name in enumerate(world.owners, 1)}
+    parts, number = [*ajar_parts(things.values(), world.catalogue)], {name: i for i, name in enumerate(world.owners, 1)}
     for k, (position, yaw) in enumerate(track, first):
-        view = world.camera(position, yaw, *LENS)
+        view, outlined = world.camera(position, yaw, *LENS), partial(hull, position=position, yaw=yaw)
         pictures = {"jpg": view.rgb[..., ::-1], "png": view.ids.astype(np.uint16)}
         for kind, picture in pictures.items():
             how = [cv2.IMWRITE_JPEG_QUALITY, 88] if kind == "jpg" else []
@@ -126,7 +129,7 @@ def film(world: World, track: Sequence[Camera], folder: Path, first: int = 0) ->
         large = [o for o, share in shares.items() if share >= LARGE or (share >= CLEAR_SHARE and o not in cut)]
         clear = (o for o in large if shares[o] >= WHOLE * outline(things[o], position, yaw))
         x, y, z = (round(float(c), 3) for c in position)
-        ajar = (o for o, c in parts if o in shares and shows(view.ids, number[o], hull(c, position, yaw)))
+        ajar = (o for o, *boxes in parts if o in shares and shows(view.ids, number[o], *map(outlined, boxes)))
         yield WalkFrame((x, y, z), round(yaw, 4), shares, tuple(sorted(clear)), tuple(sorted({*ajar})))
 
 
@@ -165,20 +168,23 @@ def hull(corners: np.ndarray, position: Sequence[float] | np.ndarray, yaw: float
     return cv2.convexHull(plane.T.astype(np.float32)) if along.min() > 0.05 else np.zeros((1, 1, 2), np.float32)
 
 
-def ajar_parts(world: World) -> Iterator[tuple[str, np.ndarray]]:
-    """Furniture by id with the (8, 3) corners, metres, of each of its doors and drawers that stands open."""
-    for p in world.moment.applied(world.house).placements:
-        whole, openness = apart(world.catalogue.mesh, p), openness_of(p.params)
+def ajar_parts(things: Iterable[Placement], catalogue: Catalogue) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+    """Furniture by id with the (8, 3) corners, metres, of each door and drawer that stands open, as it is and shut."""
+    for p in things:
+        whole, openness = apart(catalogue.mesh, p), openness_of(p.params)
         for m in whole.moving if whole else ():
             if m.kind in OPEN_KINDS and openness.get(m.name, 0.0) > AJAR:
-                turn, shift = m.turn(openness[m.name])
-                corners = np.array(np.meshgrid(*m.box.T)).reshape(3, -1).T @ turn.T + shift
-                yield p.id, RigidPose.upright(p.position, p.yaw).points(corners)
+                corners = np.array(np.meshgrid(*m.box.T)).reshape(3, -1).T
+                ways, pose = (m.turn(openness[m.name]), m.turn(0.0)), RigidPose.upright(p.position, p.yaw)
+                yield p.id, *(pose.points(corners @ turn.T + shift) for turn, shift in ways)
 
 
-def shows(ids: np.ndarray, number: int, outlined: np.ndarray) -> bool:
-    """True if a frame shows most of what is inside an outline (of `hull`), of a thing with this number."""
+def shows(ids: np.ndarray, number: int, outlined: np.ndarray, shut: np.ndarray) -> bool:
+    """True if a frame holds an outline (of `hull`) whole, neither too small nor too large, and most of it shows a thing
+    with this number; and if little enough of it is where the part is when it is shut."""
     height, width = ids.shape
+    area, both = cv2.contourArea(outlined) / 4, cv2.intersectConvexConvex(outlined, shut)[0] / 4
     pixels = (outlined[:, 0] * (1, -1) + 1) / 2 * (width, height)
     inside = cv2.fillConvexPoly(np.zeros(ids.shape, np.uint8), pixels.astype(np.int32), 1) * (ids == number)
-    return bool(inside.sum() > max(CLEAR_SHARE * ids.size, MOSTLY * cv2.contourArea(pixels.astype(np.float32))))
+    apart = both < APART * area and np.abs(outlined).max() < 1 and OPEN_SHARES[0] < area < OPEN_SHARES[1]
+    return bool(apart and inside.mean() > MOSTLY * area)
