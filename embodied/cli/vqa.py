@@ -50,7 +50,8 @@ def make(args: DatasetOptions) -> None:
 
 
 def evaluate(args: EvaluateOptions) -> None:
-    """`embodied evaluate vqa`: a row for every type (and split), a column for every agent, the judge less its twin."""
+    """`embodied evaluate vqa`: a row for every type, a column for every agent, the judge less its twin."""
+    from embodied.agents.vision.answers import guessed
     from embodied.assets.cache import write_bytes, write_json
     from embodied.datasets.vqa.build import VqaData
     from embodied.datasets.vqa.scoring import BLIND, chance, cross_judged, score
@@ -65,36 +66,42 @@ def evaluate(args: EvaluateOptions) -> None:
         )
     data = VqaData(args.data)
     splits, every = args.split or [[*data.about["counts"]][-1]], [*map(data.questions, data.about["counts"])]
-    asked = [(f"{t}, {s}" if len(splits) > 1 else t, q) for s in splits for q in data.questions(s) for t in (q.type,)]
-    asked = asked[:: -(-len(asked) // args.tasks)] if args.tasks else asked
-    questions = [q for _, q in asked]
-    of = {t: [q for name, q in asked if name == t] for t in dict.fromkeys(name for name, _ in asked)}
-    mean_of = lambda scores: [sum(scores[q.id] for q in qs) / len(qs) for qs in of.values()]
-    columns, gains = {"chance": [chance(qs) for qs in of.values()]}, list[Estimate]()
+    questions = [q for s in splits for q in data.questions(s)]
+    questions = questions[:: -(-len(questions) // args.tasks)] if args.tasks else questions
+    of = {t: [q for q in questions if q.type == t] for t in dict.fromkeys(q.type for q in questions)}
+    scores, gains = dict[str, dict[str, float]](), list[Estimate]()
+    samples = lambda m, qs: Samples(tuple(scores[m][q.id] for q in qs), tuple(q.walk.rpartition("_")[0] for q in qs))
     if "blind" in (args.agent or ("blind",)):
         known = [[q for qs in every for q in qs if q.type == t] for t in sorted({q.type for q in questions})]
-        cross = lambda m, qs: zip((q.id for q in qs), cross_judged(m, qs, args.seed + 1)[0].tolist(), strict=True)
-        columns |= {m: mean_of(dict(pair for qs in known for pair in cross(m, qs))) for m in BLIND}
+        by_id = lambda qs, judged: zip((q.id for q in qs), judged[0].tolist(), strict=True)
+        for m in BLIND:
+            scores[m] = dict(pair for qs in known for pair in by_id(qs, cross_judged(m, qs, args.seed + 1)))
+        scores["network"] = dict(by_id(together := [q for qs in every for q in qs], guessed(together, args.seed + 1)))
     if "judge" in args.agent:
-        means = [{q.id: score(q, answers[q.id]) for q in questions} for answers in judged(args, data, questions)]
-        columns |= {"judge": mean_of(means[0]), "judge, blind": mean_of(means[1])}
-        for qs in (*of.values(), questions):
-            houses = tuple(q.walk.rpartition("_")[0] for q in qs)
-            gains.append(interval([less(*(Samples(tuple(x[q.id] for q in qs), houses) for x in means))]))
+        for m, answers in zip(("judge", "judge, blind"), judged(args, data, questions)):
+            scores[m] = {q.id: score(q, answers[q.id]) for q in questions}
+        gains = [
+            interval([less(samples("judge", qs), samples("judge, blind", qs))]) for qs in (*of.values(), questions)
+        ]
     if "llm" in args.agent:
         answers = [*bar(answered(args, data, questions), "questions", "question", len(questions))]
-        scores = {q.id: score(q, answer) for q, answer in zip(questions, answers, strict=True)}
-        columns["llm"] = mean_of(scores)
+        scores["llm"] = {q.id: score(q, answer) for q, answer in zip(questions, answers, strict=True)}
         if args.out:
-            records = ({"id": q.id, "said": a, "score": scores[q.id]} for q, a in zip(questions, answers))
+            records = ({"id": q.id, "said": a, "score": scores["llm"][q.id]} for q, a in zip(questions, answers))
             save_lines(args.out / "answers.jsonl", records)
+    estimates = {m: [interval([samples(m, qs)]) for qs in of.values()] for m in scores}
+    columns = {"chance": [chance(qs) for qs in of.values()], **{m: [e.mean for e in x] for m, x in estimates.items()}}
+    half = {m: [e.half for e in x] for m, x in estimates.items()}
     cells = [[f"{100 * v:.1f}" for v in (*c, sum(c) / len(c))] for c in columns.values()]
+    for m, row in zip(half, cells[1:]):
+        row[:-1] = [f"{text} ± {100 * h:.1f}" for text, h in zip(row, half[m])]
     cells += [[f"{100 * e.mean:+.1f} ± {100 * e.half:.1f}" for e in gains]] if gains else []
     heads = ["type", "n", *columns, *["sight"] * bool(gains)]
     labels = [*((t, len(qs)) for t, qs in of.items()), ("mean of types", len(questions))]
     rows = [heads, ["---"] * len(heads), *([t, str(n), *row] for (t, n), *row in zip(labels, *cells, strict=True))]
     table = "".join(f"| {' | '.join(row)} |\n" for row in rows)
-    facts = {"data": data.about["digest"], "split": splits, "types": [*of], "scores": columns}
+    facts = {"data": data.about["digest"], "split": splits, "types": [*of], "scores": columns, "half": half}
+    facts["n"] = [len(qs) for qs in of.values()]
     facts |= {"sight": [[e.mean, e.half] for e in gains]}
     if args.out:
         write_bytes(args.out / "table.md", table.encode())

@@ -82,9 +82,11 @@ def build_vqa(
         names = [(split, i) for split, n in config.houses.items() for i in range(n)]
         for_each_unit(film_house, names, (config, folder, cache), workers=workers, watch=watch)
         scenes = scenes_of([folder / "houses" / "{}_{:04d}".format(*name) for name in names], cache)
-        for split in config.houses:
+        for split, wanted in config.questions.items():
             own = [s for s in scenes if s.walk.house.startswith(f"{split}_")]
-            every[split] = ask(config, own, config.questions[split], workers)
+            most = -(-SPARE * wanted // (len(TYPES) * len(own)))
+            parts = joblib.Parallel(n_jobs=workers)(joblib.delayed(asked_about)(s, most, config.seed) for s in own)
+            every[split] = [q for part in parts for q in part]
         unguessed(config, every, network, workers)
         for split, questions in every.items():
             save_lines(folder / f"questions_{split}.jsonl", questions)
@@ -195,13 +197,6 @@ def scenes_of(homes: Iterable[Path], cache: Path) -> list[WalkScene]:
     for scene in scenes:
         scene.elsewhere = [name for house, name in shown if house != scene.walk.house]
     return scenes
-
-
-def ask(config: VqaConfig, scenes: Sequence[WalkScene], wanted: int, workers: int = 1) -> list[VqaQuestion]:
-    """Many more questions than are wanted."""
-    most = -(-SPARE * wanted // (len(TYPES) * len(scenes)))
-    parts = joblib.Parallel(n_jobs=workers)(joblib.delayed(asked_about)(s, most, config.seed) for s in scenes)
-    return [q for part in parts for q in part]
 
 
 def unguessed(config: VqaConfig, left: dict[str, list[VqaQuestion]], network: Judge, workers: int) -> None:

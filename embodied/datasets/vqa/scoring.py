@@ -138,10 +138,8 @@ def narrowed(questions: Questions, seed: int) -> list[VqaQuestion]:
             chosen[q.id] = sorted(range(1, len(q.options)), key=lambda i: -wanted[i])[: OPTIONS - 1]
             wrongs.update(cells[q.id][i] for i in chosen[q.id])
         if max(map(len, cells.values())) > OPTIONS:
-            over = {c: math.ceil((n - wrongs[c] / 3 - ALONE[c[0] > ""]) / 2) for c, n in rights.items()}
-            place = Counter[tuple[str, str]]()
-            ranks = [place.update([c := cells[q.id][0]]) or place[c] for q in left]
-            left = [q for q, rank in zip(left, ranks) if rank > over[cells[q.id][0]]]
+            over = Counter({c: math.ceil((n - wrongs[c] / 3 - ALONE[c[0] > ""]) / 2) for c, n in rights.items()})
+            left = [q for q in left if over[c := cells[q.id][0]] <= 0 or over.subtract([c])]
     out = []
     for k, q in enumerate(left):
         options = [q.options[i] for i in stream(seed, "options", q.id).permutation(chosen[q.id]).tolist()]

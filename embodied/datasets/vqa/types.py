@@ -38,7 +38,7 @@ STANDS, CORNER, STRAIGHT, ROUTES = 1.2, 60.0, 25.0, 400
 """Metres within which one is at a thing; degrees from which a bend of a way is a turn, and below which it is none;
 ways of a walk that are looked at."""
 FACED, TRIPLES, OFFERED = 1.0, 200, 24
-"""Least metres to what is faced; groups of three things that are looked at; most wrong options to choose from."""
+"""Least metres to what is faced; sets of three things that are looked at; most wrong options to choose from."""
 Sides = dict[str, tuple[float, float]]
 """Degrees to the left, from and to."""
 TWO_SIDES: Sides = {"left": (0, 180), "right": (-180, 0)}
