@@ -18,7 +18,7 @@ from scipy.sparse.linalg import lsqr
 
 from embodied.seeds import stream
 
-LETTERS, OPTIONS, ALONE = "ABCDE", 4, (0.7, 1.5)
+LETTERS, OPTIONS, ALONE = "ABCDE", 4, (0.7, 2.0)
 """Most options of a question; by how many times more often than chance has it one may be right, in all questions of a
 type, or in those about a kind of thing."""
 NEAR_CHANCE, MOST_ALIKE, FEWEST_LEFT = 0.03, 1 / 2, 12

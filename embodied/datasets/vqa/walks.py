@@ -32,7 +32,7 @@ and at least WHOLE of the outline of its box shows it. With less than GLIMPSE in
 question is about what lies between."""
 EYES = 0.93
 """Height of people's eyes, of their height as they stand or sit."""
-AJAR, MOSTLY, APART, OPEN_SHARES, OPEN_KINDS = 0.3, 0.4, 0.7, (0.006, 0.35), ("door", "flap", "drawer")
+AJAR, MOSTLY, APART, OPEN_SHARES, OPEN_KINDS = 0.5, 0.4, 0.7, (0.006, 0.35), ("door", "flap", "drawer")
 """Openness from which a door or drawer stands open; the share of its outline that shows it, at least, and that is where
 it is when shut, at most; the outline's least and most share of a frame."""
 Camera = tuple[np.ndarray, float]
