@@ -76,7 +76,8 @@ def strip_of_frames(frames: Sequence[np.ndarray]) -> np.ndarray:
 
 class FoundThing(NamedTuple):
     """Places where a thing of some classes seems to be, from each of s spots: (s, 12, 36) probabilities, and the
-    largest `near` each cell; (s, 3) metres; (9,) when it is seen first, how surely, how many, and where."""
+    largest `near` each cell; (s, 3) metres; (11,) when it is seen first, how surely, how many, where, and how much more
+    surely, and how far from there, at last."""
 
     sure: np.ndarray
     near: np.ndarray
@@ -132,6 +133,7 @@ class Eyes:
         peaks, k = ((sure == near) & (sure > THERE)).sum((1, 2)), int(most.argmax())
         facts = [seen, most.max(), most.mean(), peaks.max() / 4, peaks.sum() / 8, sure.sum((1, 2)).max() / 8]
         facts += [float(divmod(best[k], encoder.STRIP_COLUMNS)[0]), logs[k], math.log(sure[k].sum() + 0.1)]
+        facts += [most[-1] - most[0], float(np.linalg.norm(spots[-1] - spots[0]))]
         return FoundThing(sure, near, np.array(spots), np.array(facts))
 
     def facts(self, q: VqaQuestion) -> Tensor:
@@ -140,7 +142,7 @@ class Eyes:
         about, rows = [*seen(q.text), *[None] * MENTIONS][:MENTIONS], list[np.ndarray]()
         for option in q.options or ("",):
             slots = [*about, *(offered := [*seen(option), None])[:1]]
-            parts = [s.facts if s else np.zeros(9) for s in slots]
+            parts = [s.facts if s else np.zeros(11) for s in slots]
             parts += [_pair(a, b) for a, b in itertools.combinations(slots, 2)]
             rows.append(np.concatenate([*parts, _side(*slots[:3]), _order(offered)]))
         return torch.from_numpy(np.array(rows, np.float32))
