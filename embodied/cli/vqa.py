@@ -101,8 +101,7 @@ def evaluate(args: EvaluateOptions) -> None:
     rows = [heads, ["---"] * len(heads), *([t, str(n), *row] for (t, n), *row in zip(labels, *cells, strict=True))]
     table = "".join(f"| {' | '.join(row)} |\n" for row in rows)
     facts = {"data": data.about["digest"], "split": splits, "types": [*of], "scores": columns, "half": half}
-    facts["n"] = [len(qs) for qs in of.values()]
-    facts |= {"sight": [[e.mean, e.half] for e in gains]}
+    facts |= {"sight": [[e.mean, e.half] for e in gains], "n": [len(qs) for qs in of.values()]}
     if args.out:
         write_bytes(args.out / "table.md", table.encode())
         write_json(args.out / "table.json", facts, indent=1)

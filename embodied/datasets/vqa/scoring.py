@@ -19,8 +19,7 @@ from scipy.sparse.linalg import lsqr
 from embodied.seeds import stream
 
 LETTERS, OPTIONS, ALONE = "ABCDE", 4, (0.7, 2.0)
-"""Most options of a question; by how many times more often than chance has it one may be right, in all questions of a
-type, or in those about a kind of thing."""
+"""Most options of a question; how many times more often than chance has it one may be right, of all, or of a cell."""
 NEAR_CHANCE, MOST_ALIKE, FEWEST_LEFT = 0.03, 1 / 2, 12
 """How far above chance a blind model may be; most questions of a type with one number; fewest of a type."""
 BLIND = ("majority", "prior", "classifier")
@@ -127,8 +126,7 @@ def _words(model: str, questions: Questions) -> csr_array:
 
 def narrowed(questions: Questions, seed: int) -> list[VqaQuestion]:
     """Questions of one type, whose first option is right, with OPTIONS each, and each letter right equally often. Where
-    there are more, some are chosen, and questions left out, such that what is offered about a kind of thing is wrong
-    three times as often as it is right, or more often."""
+    there are more, some are chosen, and questions left out, until each cell is wrong three times as often as right."""
     left = [questions[i] for i in stream(seed, "narrowed").permutation(len(questions))]
     cells, chosen, before = {q.id: _cells(q) for q in questions}, dict[str, list[int]](), 0
     while len(left) != before:
@@ -143,8 +141,7 @@ def narrowed(questions: Questions, seed: int) -> list[VqaQuestion]:
     out = []
     for k, q in enumerate(left):
         options = [q.options[i] for i in stream(seed, "options", q.id).permutation(chosen[q.id]).tolist()]
-        if q.options:
-            options.insert(k % (len(options) + 1), q.answer)
+        options[(place := k % (len(options) + 1)) : place] = q.options[:1]
         fixed = len(q.about) - len(q.options) + 1
         about = [n for i, n in enumerate(q.about) if fixed < 1 or i < fixed or i - fixed + 1 in chosen[q.id]]
         out.append(replace(q, options=tuple(options), about=tuple(about)))
@@ -152,7 +149,7 @@ def narrowed(questions: Questions, seed: int) -> list[VqaQuestion]:
 
 
 def _cells(q: VqaQuestion) -> list[tuple[str, str]]:
-    """The kind of thing that a question is about, and that of each option, by their ids or the words of the option."""
+    """The kind of thing that a question is about, with that of each option, by its id or words."""
     fixed, kind = len(q.about) - len(q.options) + 1, lambda i: i.rpartition("_")[0]
     kinds = [kind(i) for i in q.about[fixed - 1 :]] if fixed > 0 else q.options
     return [(kind(q.about[0]) if len(q.about) > 1 else "", k) for k in kinds] or [("", "")]

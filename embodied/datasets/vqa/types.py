@@ -88,7 +88,6 @@ def distance(s: WalkScene) -> Asked:
 
 
 def nearest(s: WalkScene) -> Asked:
-    """Not always for the nearest of all things, but for the nearest of those that are offered."""
     for (a, first), *others in groups(s, 2 + OFFERED, least=1 + OPTIONS):
         metres, ids, names = zip(*sorted((gap(a, p), p.id, name) for p, name in others))
         for k in s.shuffled(range(len(ids) - OPTIONS + 1))[:2]:
@@ -107,13 +106,11 @@ def room_size(s: WalkScene) -> Asked:
 
 
 def turned(sides: Sides) -> QuestionType:
-    """The type that asks on which side something lies for who stands by a thing and faces another."""
+    """The type that asks where a thing is for who stands by one and faces another: each side of the same three."""
 
     def asked(s: WalkScene) -> Asked:
-        """A question for each side, all with the same three things."""
         things = [s.named(s.in_room(room)) for room in s.looked_at]
-        every = s.shuffled([three for of_room in things for three in itertools.combinations(of_room, 3)])
-        for three in every[:TRIPLES]:
+        for three in s.shuffled([x for of_room in things for x in itertools.combinations(of_room, 3)])[:TRIPLES]:
             questions = dict[str, VqaQuestion]()
             for (a, first), (b, second), (c, third) in s.shuffled([*itertools.permutations(three)]):
                 if min(math.dist(middle(a), middle(t)) for t in (b, c)) > FACED:
@@ -151,9 +148,8 @@ def visibility(s: WalkScene) -> Asked:
     for name in s.shuffled(sorted({p.object_class for p in s.things})):
         seen = [p.id for p in s.things if p.object_class == name]
         others = sorted(dict.fromkeys(s.shuffled(unseen)), key=lambda n: abs(often[n] - often[name]))[:OFFERED]
-        if len(others) >= OPTIONS - 1:
-            fact = f"first in frame {min(s.clear[i] for i in seen)}"
-            yield s.ask(s.noun(name), seen[:1], [away[n] for n in others], fact)
+        fact = f"first in frame {min(s.clear[i] for i in seen)}"
+        yield from [s.ask(s.noun(name), seen[:1], [away[n] for n in others], fact)] * (len(others) > 2)
 
 
 def carried(shelf: bool) -> QuestionType:

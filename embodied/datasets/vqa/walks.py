@@ -32,7 +32,7 @@ and at least WHOLE of the outline of its box shows it. With less than GLIMPSE in
 question is about what lies between."""
 EYES = 0.93
 """Height of people's eyes, of their height as they stand or sit."""
-AJAR, MOSTLY, APART, OPEN_SHARES, OPEN_KINDS = 0.5, 0.4, 0.7, (0.006, 0.35), ("door", "flap", "drawer")
+AJAR, MOSTLY, OVERLAP, OPEN_SHARES, OPEN_KINDS = 0.5, 0.4, 0.7, (0.006, 0.35), ("door", "flap", "drawer")
 """Openness from which a door or drawer stands open; the share of its outline that shows it, at least, and that is where
 it is when shut, at most; the outline's least and most share of a frame."""
 Camera = tuple[np.ndarray, float]
@@ -186,5 +186,5 @@ def shows(ids: np.ndarray, number: int, outlined: np.ndarray, shut: np.ndarray) 
     area, both = cv2.contourArea(outlined) / 4, cv2.intersectConvexConvex(outlined, shut)[0] / 4
     pixels = (outlined[:, 0] * (1, -1) + 1) / 2 * (width, height)
     inside = cv2.fillConvexPoly(np.zeros(ids.shape, np.uint8), pixels.astype(np.int32), 1) * (ids == number)
-    apart = both < APART * area and np.abs(outlined).max() < 1 and OPEN_SHARES[0] < area < OPEN_SHARES[1]
-    return bool(apart and inside.mean() > MOSTLY * area)
+    seen = both < OVERLAP * area and np.abs(outlined).max() < 1 and OPEN_SHARES[0] < area < OPEN_SHARES[1]
+    return bool(seen and inside.mean() > MOSTLY * area)
