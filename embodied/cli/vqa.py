@@ -78,8 +78,8 @@ def evaluate(args: EvaluateOptions) -> None:
             scores[m] = dict(pair for qs in known for pair in by_id(qs, cross_judged(m, qs, args.seed + 1)))
         scores["network"] = dict(by_id(together := [q for qs in every for q in qs], guessed(together, args.seed + 1)))
     if "judge" in args.agent:
-        for m, answers in zip(("judge", "judge, blind"), judged(args, data, questions)):
-            scores[m] = {q.id: score(q, answers[q.id]) for q in questions}
+        for m, answer_of in zip(("judge", "judge, blind"), judged(args, data, questions)):
+            scores[m] = {q.id: score(q, answer_of[q.id]) for q in questions}
         gains = [
             interval([less(samples("judge", qs), samples("judge, blind", qs))]) for qs in (*of.values(), questions)
         ]

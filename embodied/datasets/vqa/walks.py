@@ -174,9 +174,9 @@ def ajar_parts(things: Iterable[Placement], catalogue: Catalogue) -> Iterator[tu
         whole, openness = apart(catalogue.mesh, p), openness_of(p.params)
         for m in whole.moving if whole else ():
             if m.kind in OPEN_KINDS and openness.get(m.name, 0.0) > AJAR:
-                corners = np.array(np.meshgrid(*m.box.T)).reshape(3, -1).T
-                ways, pose = (m.turn(openness[m.name]), m.turn(0.0)), RigidPose.upright(p.position, p.yaw)
-                yield p.id, *(pose.points(corners @ turn.T + shift) for turn, shift in ways)
+                corners, pose = np.array(np.meshgrid(*m.box.T)).reshape(3, -1).T, RigidPose.upright(p.position, p.yaw)
+                is_at = lambda turn, shift, box=corners, pose=pose: pose.points(box @ turn.T + shift)
+                yield p.id, is_at(*m.turn(openness[m.name])), is_at(*m.turn(0.0))
 
 
 def shows(ids: np.ndarray, number: int, outlined: np.ndarray, shut: np.ndarray) -> bool:
