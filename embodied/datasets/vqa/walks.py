@@ -32,9 +32,9 @@ and at least WHOLE of the outline of its box shows it. With less than GLIMPSE in
 question is about what lies between."""
 EYES = 0.93
 """Height of people's eyes, of their height as they stand or sit."""
-AJAR, MOSTLY, OVERLAP, OPEN_SHARES, OPEN_KINDS = 0.5, 0.4, 0.7, (0.006, 0.35), ("door", "flap", "drawer")
-"""Openness from which a door or drawer stands open; the share of its outline that shows it, at least, and that is where
-it is when shut, at most; the outline's least and most share of a frame."""
+AJAR, MOSTLY, BESIDES, OVERLAP, OPEN_SHARES, OPEN_KINDS = 0.5, 0.5, 1.3, 0.7, (0.006, 0.35), ("door", "flap", "drawer")
+"""Openness from which a door or drawer stands open; the least share of its outline that shows it; how much of the thing
+is seen for it; the most share of the outline that is where it is when shut; its least and most share of a frame."""
 Camera = tuple[np.ndarray, float]
 """(3,) position, metres, and yaw, radians."""
 
@@ -187,4 +187,4 @@ def shows(ids: np.ndarray, number: int, outlined: np.ndarray, shut: np.ndarray) 
     pixels = (outlined[:, 0] * (1, -1) + 1) / 2 * (width, height)
     inside = cv2.fillConvexPoly(np.zeros(ids.shape, np.uint8), pixels.astype(np.int32), 1) * (ids == number)
     seen = both < OVERLAP * area and np.abs(outlined).max() < 1 and OPEN_SHARES[0] < area < OPEN_SHARES[1]
-    return bool(seen and inside.mean() > MOSTLY * area)
+    return bool(seen and inside.mean() > MOSTLY * area and (ids == number).sum() > BESIDES * inside.sum())
