@@ -36,6 +36,8 @@ from embodied.seeds import checked_seed, stream
 
 PLAN_TRIES = 14000
 """Candidate plans per attempt, times rooms wanted: large houses get fewer."""
+GALLERY_FROM = 56.0
+"""Square metres of a storey; in smaller ones, a gallery that is asked for takes the room of living rooms."""
 DEFAULT = HouseConfig()
 
 
@@ -112,7 +114,7 @@ def rooms(draft: Draft) -> Draft:
         drawn = draw_plan(footprints, spaces, tries, rng=rng)
         plan = None if drawn is None else drawn[1]
     else:
-        gallery = "gallery" in (draft.config.special or ())
+        gallery = "gallery" in (draft.config.special or ()) and draft.area >= GALLERY_FROM * storeys
         plan = draw_storeys(draft.area, draft.shape, spaces, storeys, tries, gallery=gallery, rng=rng)
     if plan is None:
         raise DeadEndError(
