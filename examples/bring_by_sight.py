@@ -166,7 +166,8 @@ class Teacher(Searcher):
 
 
 class Sighted(Searcher):
-    """Chooses by a trained network what nearly the best is; the blind twin sees nothing."""
+    """Chooses by a trained network the likeliest verb, and of its words what nearly the best is; the blind twin sees
+    nothing."""
 
     def __init__(self, network: Chooser, eye: Eye, blind: bool) -> None:
         super().__init__()
@@ -176,14 +177,22 @@ class Sighted(Searcher):
     def choices(self, o: Observation, m: Search) -> list[str]:
         names = [w[5:] for w in o.candidates.words if w.startswith("take ")] if not self._blind else []
         seen = dict(zip(names, self._eye.features(names), strict=True))
-        scores = self._network(moment(o, m, request_of(o), seen, self._eye.size))
-        return [c for c, near in zip(options(o, m), scores > scores.max() - 0.3) if near]
+        e = moment(o, m, request_of(o), seen, self._eye.size)
+        return [c for c, near in zip(options(o, m), chosen(self._network(e), e)) if near]
+
+
+def chosen(scores: torch.Tensor, e: Example) -> torch.Tensor:
+    """(n,) bool of choices with (n,) scores: of the likeliest verb, those that are nearly the best."""
+    verbs = e.facts[:, : len(VERBS)]
+    own = verbs[:, (torch.softmax(scores, 0) @ verbs).argmax()] > 0
+    return own & (scores > scores[own].max() - 0.3)
 
 
 def train(examples: list[Example], blind: bool, passes: int, seed: int) -> Chooser:
     """A network under which what was right is likely."""
     seen = [dataclasses.replace(e, seen=torch.zeros_like(e.seen)) for e in examples] if blind else examples
-    rng = stream(seed, "bring by sight")
+    rng, takes = stream(seed, "bring by sight"), [bool(e.facts[e.right, VERBS.index("take")].any()) for e in seen]
+    rare = (len(takes) / max(sum(takes), 1) - 1) / 2  # in play, what is meant is seldom in sight
     with seeded(seed):
         network = Chooser(torch.cat([e.seen[e.facts[:, VERBS.index("take")] > 0] for e in seen]))
         optimizer = torch.optim.AdamW(network.parameters(), 1e-3, weight_decay=1e-2)
@@ -193,9 +202,24 @@ def train(examples: list[Example], blind: bool, passes: int, seed: int) -> Choos
                 optimizer.zero_grad()
                 for i in order[k : k + 16]:
                     likely = torch.log_softmax(network(seen[i]), 0)
-                    (-torch.logsumexp(likely[seen[i].right], 0) / 16).backward()
+                    (-torch.logsumexp(likely[seen[i].right], 0) * (rare if takes[i] else 1.0) / 16).backward()
                 optimizer.step()
     return network
+
+
+def judged(network: Chooser, examples: list[Example], blind: bool) -> tuple[list[float], list[float]]:
+    """Of moments at which one of several things in sight is meant, whether it scores best; of all, whether a choice is
+    right."""
+    things, choices = list[float](), list[float]()
+    for e in examples:
+        shown = dataclasses.replace(e, seen=torch.zeros_like(e.seen)) if blind else e
+        with torch.no_grad():
+            scores = network.eval()(shown)
+        left, take = chosen(scores, e), e.facts[:, VERBS.index("take")] > 0
+        choices.append(float(e.right[left].float().mean()))
+        if take.sum() > 1 and e.right[take].any():
+            things.append(float(e.right[take][scores[take].argmax()]))
+    return things, choices
 
 
 def opened(house: int, encoder: Encoder, pictures: str) -> tuple[BringEnv, Eye]:
@@ -236,6 +260,10 @@ if __name__ == "__main__":
     sighted, blind = (train(examples, x, args.passes, args.seed) for x in (False, True))
     print(len(examples), "moments", flush=True)
     for house in range(*args.judge):
+        moments = taught(house, encoder, args.pictures, 1, args.seed)
+        for name, network in (("sees", sighted), ("blind twin", blind)):
+            things, choices = judged(network, moments, name == "blind twin")
+            print(f"{house} {name:12} things {np.mean(things):.3f} choices {np.mean(choices):.3f}", flush=True)
         env, eye = opened(house, encoder, args.pictures)
         players = {"reads names": Searcher(*QUESTIONS), "sees": Sighted(sighted, eye, False)}
         players["blind twin"] = Sighted(blind, eye, True)

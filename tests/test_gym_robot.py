@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import torch
 from absl.testing import absltest
 from conftest import two_rooms
 from dm_env import specs, test_utils
@@ -250,3 +251,25 @@ def test_specs_say_what_spaces_say_and_others_are_refused():
     assert spec["b"].maximum.tolist() == [2, 2] and spec["b"].dtype == np.float32
     with pytest.raises(ValueError, match="no spec for Text"):
         spec_of(spaces.Text(3), "words")
+
+
+def test_a_chooser_learns_to_see_which_thing_is_meant_and_its_blind_twin_does_not():
+    sight, rng, names = (
+        example("bring_by_sight.py"),
+        np.random.default_rng(0),
+        ["red mug", "blue mug", "book", "shoe", "lamp"],
+    )
+    looks, takes = rng.normal(size=(4, 6)), sight.VERBS.index("take")
+
+    def moments(n):
+        for _ in range(n):
+            order, meant = rng.permutation(4), int(rng.integers(5))
+            facts = torch.zeros(5, sight.FACTS)
+            facts[:4, takes] = facts[4, 0] = 1.0
+            seen = torch.tensor(np.vstack([looks[order] + 0.1 * rng.normal(size=(4, 6)), np.zeros(6)])).float()
+            right = torch.tensor([*(order == meant), meant == 4])  # no lamp is there: go
+            yield sight.Example(facts, seen, torch.tensor(sight.codes(names[meant])), right)
+
+    taught, others = [*moments(200)], [*moments(100)]
+    found = [np.mean(sight.judged(sight.train(taught, x, 25, 0), others, x)[0]) for x in (False, True)]
+    assert found[0] > 0.9 and found[1] < 0.5
