@@ -14,7 +14,8 @@ import shapely
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
-from embodied.assets.people import people
+from embodied.assets.people import JOINTS, people
+from embodied.assets.people.bodies import transforms
 from embodied.envs.continuous import CONTACT, Body, ContinuousEnv, ContinuousEpisode, NavigationGoal, social_measures
 from embodied.envs.driven import Driver
 from embodied.evaluation.evaluate import agent, play
@@ -28,7 +29,7 @@ from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.free_space import leaves, room_doors
 from embodied.people.errands import Walks
 from embodied.people.gait import Limbs, solved
-from embodied.people.strolls import PERSON_RADIUS, Crowd, Stroll, Walker, draw_strolls
+from embodied.people.strolls import PERSON_RADIUS, Crowd, Stroll, Walker, draw_strolls, noticing
 from embodied.records import from_json, to_json
 from embodied.render.camera import camera_at
 from embodied.world import open_world
@@ -93,6 +94,32 @@ def test_contact_ends_an_episode_unless_people_stand_for_the_body(world):
         while not env.ended and env.steps < 60:
             env.step(2)
         assert env.contact == touched == env.ended
+
+
+def test_who_finds_somebody_standing_in_the_way_walks_around_them_on_free_floor_or_waits(world):
+    walks, stroll = Walks(world.house), ACROSS
+    for stands, passed in ((np.array([2.5, 2.0, 0.0]), True), (np.array([1.0, 2.0, 0.0]), False)):
+        crowd, seen = Crowd([stroll], walks, polite=True), []
+        for _ in range(140):
+            assert crowd.go_on(0.1, stands, stands) > CONTACT
+            seen.append(crowd.places[0, :3])
+        assert walks.ground.space.buffer(1e-3).covers(shapely.MultiPoint(np.array(seen)[:, :2]))
+        assert (min(x for x, *_ in seen) < 1.2) == passed
+        assert np.linalg.norm(np.diff(seen, axis=0), axis=1).max() < 0.15
+
+
+def test_people_look_at_who_is_near_and_in_sight_as_far_as_the_neck_lets_them(world):
+    person = people()["mei"]
+    still = solved(limbs := Limbs(person), limbs.standing(np.array([3.0, 2.0, 0.0]), 0.0))
+    now = Moment(people={"mei": MovingPerson("mei", *still)})
+    for eye, turns in (((4.5, 2.8, 1.5), 0.49), ((3.2, 3.8, 1.5), 1.2), ((1.5, 2.0, 1.5), 0), ((7.5, 2.0, 1.5), 0)):
+        figure = noticing(now, np.array(eye), world.house).people["mei"]
+        head = transforms(person, figure.pose)[[*JOINTS].index("head"), :, :3]
+        yaw = math.atan2(*(figure.place.rotation @ head @ [0, -1, 0])[1::-1])
+        assert yaw == pytest.approx(turns, abs=0.3 if turns else 1e-3)
+    crowd = Crowd([ACROSS], Walks(world.house))
+    away = [crowd.moment, (crowd.go_on(0.1, *[np.array([2.5, 2.3, 0.0])] * 2), crowd.moment)[1]]
+    assert "left_eye" in away[1].people["mei"].pose.joints and "left_eye" not in away[0].people["mei"].pose.joints
 
 
 def test_measures_by_hand(world):
@@ -168,7 +195,7 @@ def test_environments_show_people_and_tell_the_measures(world):
     follow = gymnasium.make("embodied/FollowNav-v0", **small)
     follow.reset(seed=0)
     assert {"found", "following"} <= set(follow.step(0)[-1])
-    drive = gymnasium.make("embodied/Drive-v0", people=2, **small).unwrapped
+    drive = gymnasium.make("embodied/Drive-v0", people=2, polite=False, **small).unwrapped
     drive.reset(seed=0)
     driving = drive.driving
     x, y, z, heading = driving.crowd.places[0]

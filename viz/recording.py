@@ -28,6 +28,7 @@ from embodied.kinds.task_kind import kind_named
 from embodied.language.plain_language import detokenized
 from embodied.navigation.doors import place_named, seen_name
 from embodied.navigation.free_space import EYE
+from embodied.people.strolls import noticing
 from embodied.render.camera import camera_at
 from embodied.render.panorama import Panorama, Recognised
 from embodied.render.photograph import PhotoCamera
@@ -119,7 +120,7 @@ def record(
         if step.seconds is not None:  # people took part
             recording.set_time("seconds", duration=step.seconds)
         if living is not None:
-            log_people(recording, living(index))
+            log_people(recording, noticing(living(index), world.graph.positions[step.pose.node], world.house))
         log_step(recording, world, task, step, state, views.with_closed(step.pose.node, closed))
         closed ^= doors_moved(step, world.graph, closed)
         yield step

@@ -17,7 +17,7 @@ from embodied.interface import Place, SuccessRule, Trajectory
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.navigation.free_space import ajar_doors
 from embodied.navigation.graph import AGENT_RADIUS
-from embodied.people.strolls import PERSON_RADIUS, Crowd, Stroll
+from embodied.people.strolls import PERSON_RADIUS, Crowd, Stroll, walks_of
 from embodied.tasks.goals import NOT_OBJECTS, footprint_distance
 
 PERSONAL, CONTACT, TIMELY = 1.0, AGENT_RADIUS + PERSON_RADIUS, 0.025
@@ -69,7 +69,7 @@ class Body:
     pitch: float = 0.0
     """Degrees that a level camera is mounted above the horizon."""
     polite: bool = False
-    """People stand while the body is close before them; otherwise they do not see it."""
+    """People stand while the body is close before them, and then walk around it; otherwise they only look at it."""
 
     def __post_init__(self) -> None:
         if not (0 < self.forward <= 1 and 0 < self.turn <= 90 and 360 % self.turn == 0 and self.steps >= 1):
@@ -211,7 +211,9 @@ class ContinuousEnv:
         self.position = self.ground.nearest_free(self.ground.plane(np.array(episode.start)))
         """(2,) metres, in the plane of `ground`."""
         self.yaw, self.tilt, self.collided, self.collisions, self.ended = episode.yaw, 0, False, 0, False
-        self.crowd, self.contact = Crowd(episode.people, polite=self.body.polite), False
+        walks = walks_of(place.house) if episode.people else None
+        self.crowd = Crowd(episode.people, walks, polite=self.body.polite, eye=self.body.eye)
+        self.contact = False
         """The people, and whether the body touched one."""
         self._people = [self.crowd.places]
         self._actions: list[int] = []

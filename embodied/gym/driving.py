@@ -26,7 +26,7 @@ from embodied.language.plain_language import with_article
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.navigation.free_space import EYE
 from embodied.people.errands import Walks
-from embodied.people.strolls import Crowd, draw_strolls, who_is_about
+from embodied.people.strolls import Crowd, draw_strolls, walks_of, who_is_about
 from embodied.render.camera import Camera, camera_at
 from embodied.scene.doors import openness
 from embodied.seeds import stream
@@ -75,6 +75,8 @@ class DriveSettings:
     """An object is found within this many metres of its outline, in its room."""
     people: int = 0
     """Most people who walk about, at least one unless it is 0; touching somebody ends an episode."""
+    polite: bool = True
+    """They stand while the body is close before them, and then walk around it; otherwise they only look at it."""
 
     def __post_init__(self) -> None:
         driven_task(self.task)
@@ -156,7 +158,7 @@ class Driving:
         if name not in self._stages:
             house = self.world.house
             who = who_is_about(house, self.settings.people, rng=stream(0, "visitors", name))
-            walks = Walks(house) if who else None
+            walks = walks_of(house) if who else None
             driver = Driver(house, self.world.catalogue, who, [s.door for s in walks.swings] if walks else ())
             self._stages[name] = driver, FloorWays(house, stairs=False), walks, who
         self._stages.move_to_end(name)
@@ -175,7 +177,8 @@ class Driving:
         self.collisions: list[str] = []
         self.touched, self.respectful = False, list[bool]()
         about = [str(p) for p in rng.permutation(who)[: rng.integers(1, len(who) + 1)]] if who else []
-        self.crowd = Crowd(draw_strolls(walks, about, self._here, rng=rng) if walks else ())
+        strolls = draw_strolls(walks, about, self._here, rng=rng) if walks else ()
+        self.crowd = Crowd(strolls, walks, polite=self.settings.polite)
         self.driver.stand(self.crowd.moment)
         self.ended: str | None = None
         """'reached', 'said', 'contact' or 'limit'; None while it goes on."""

@@ -90,7 +90,7 @@ class Walks:
     """Owns the floor of a house whose doors people open."""
 
     def __init__(self, house: House) -> None:
-        shut = closed_doors(house)
+        self.house, shut = house, closed_doors(house)
         self.ground = FloorWays(opened(house, shut))
         self.swings = [swing_of(house, o) for o in house.openings if o.id in shut]
         self.fronts = [swing_of(house, o) for o in house.openings if o.kind == "front_door"]
@@ -127,6 +127,12 @@ class ErrandLeg:
     def place(self, seconds: float) -> tuple[np.ndarray, float]:
         """(3,) metres, world, where the body is at a time, and its heading."""
         return self.course.body(self.course.walked(seconds - self.begin))
+
+    def ahead(self, seconds: float) -> np.ndarray:
+        """(m, 5) the rest of its Course.line."""
+        walked = self.course.walked(seconds - self.begin)
+        (x, y, z), heading = self.course.body(walked)
+        return np.array([(walked, x, y, z, heading), *self.course.line[self.course.line[:, 0] > walked]])
 
     def bearing(self, seconds: float) -> Bearing:
         """The body at a time."""

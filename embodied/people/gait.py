@@ -20,10 +20,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from embodied.assets.json_file import read_toml
-from embodied.assets.people import Person, Pose
-from embodied.assets.people.bodies import rotation_of
+from embodied.assets.people import Person, Pose, gaze, joint_positions, people
+from embodied.assets.people.bodies import rotation_of, transforms
 from embodied.geometry import rotation, wrap, yaw_facing
-from embodied.house.moment import RigidPose
+from embodied.house.moment import MovingPerson, RigidPose
 
 CYCLE: Any = read_toml(Path(__file__).with_suffix(".toml"))
 """Rows of Fourier series over a cycle, by name (gait.toml)."""
@@ -39,6 +39,8 @@ FLAT_FOOT, FOOT_CLEARANCE = 0.05, 0.025
 """Pitch of a foot, radians, below which it stands flat, and leg lengths of its sole above the ground in the air."""
 BALL, HEEL = 0.15, 0.055
 """Leg lengths from below the ankle to the ball of the foot and to the heel."""
+NOTICED, BEHIND, CHEST = 2.5, 2.6, 2
+"""Metres and radians from straight ahead beyond which nobody looks at somebody; number of a joint."""
 SIDES = ("right", "left")
 UP, FRONT = np.array([0.0, 0.0, 1.0]), np.array([0.0, -1.0, 0.0])
 Foot: TypeAlias = np.ndarray
@@ -286,6 +288,18 @@ def solved(limbs: Limbs, b: Bearing) -> Posed:
     x, y, z = b.position.tolist()
     vectors = zip(out, Rotation.from_matrix(np.array([*out.values()])).as_rotvec().tolist())
     return RigidPose.upright((x, y, z), yaw), Pose({name: (a, b, c) for name, (a, b, c) in vectors}, lift)
+
+
+def looking(figure: MovingPerson, eye: np.ndarray) -> MovingPerson:
+    """Somebody who turns eyes and head, as far as the neck lets them, to (3,) an eye, metres, world: wholly within 2 m,
+    not beyond NOTICED; nor who lies, or has it behind."""
+    person, place = people()[figure.person], figure.place
+    chest = place.rotation @ transforms(person, figure.pose)[CHEST, :, :3]
+    x, y, z = chest.T @ (eye - place.points(joint_positions(person, figure.pose)["head"][None])[0])
+    yaw, far = math.atan2(x, -y), math.hypot(x, y, z)
+    share = smooth(2 * (NOTICED - far)) * smooth(2 * (BEHIND - abs(yaw))) * (chest[2, 2] > 0.5)
+    seen = gaze(figure.pose, yaw, math.atan2(z, math.hypot(x, y)))
+    return dataclasses.replace(figure, pose=between((place, figure.pose), (place, seen), share)[1]) if share else figure
 
 
 def _hanging(bone: np.ndarray) -> np.ndarray:

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import bisect
+import dataclasses
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from embodied.assets.people import people
 from embodied.house.house import House
 from embodied.house.household import residents
 from embodied.house.moment import Moment, MovingPerson, Triple
-from embodied.people.errands import WAY_STEP, Climb, ErrandLeg, Swing, Walks, legs_along, openness
-from embodied.people.gait import Limbs, solved
+from embodied.navigation.free_space import EYE, sight_floor
+from embodied.people.errands import BODY_GAP, WAY_STEP, Climb, ErrandLeg, Swing, Walks, legs_along, openness
+from embodied.people.gait import NOTICED, Limbs, between, looking, smooth, solved
 
 PERSON_RADIUS, PERSON_HEIGHT, ABOUT, SHORTEST = 0.25, 1.7, 1.5, 3.0
 """Metres: of the cylinder that stands for a person, from the agent's start at first, and of a way at least."""
+PATIENCE, DETOUR = 1.0, 4.0
+"""Seconds of waiting before somebody is walked around, and metres that this may be longer."""
 TRIES, TOGETHER, PAUSES = 20, 130.0, (1.0, 5.0)
 """Ways that are drawn for a person; seconds for which people keep apart, and for which they stand at an end."""
 
@@ -66,6 +72,11 @@ class Walker:
     def figure(self, seconds: float) -> MovingPerson:
         return MovingPerson(self.person, *solved(self._limbs, self._leg(seconds).bearing(self._since(seconds))))
 
+    def leg(self, seconds: float) -> ErrandLeg:
+        """The part of the way at a time, by a clock that does not begin anew with each round."""
+        leg, rounds = self._leg(seconds), seconds - self._since(seconds)
+        return dataclasses.replace(leg, begin=leg.begin + rounds, end=leg.end + rounds)
+
     def openness(self, seconds: float) -> dict[str, float]:
         """How far doors are open that are closed at rest."""
         return openness(self._doors, self._since(seconds))
@@ -78,13 +89,23 @@ class Walker:
 
 
 class Crowd:
-    """The people of an episode, each with a clock of their own."""
+    """The people of an episode, each with a clock of their own, who look at somebody who is near."""
 
-    def __init__(self, strolls: Sequence[Stroll], *, polite: bool = False) -> None:
-        """`polite`: they stand while somebody is within ABOUT before them; otherwise they see nobody."""
-        self._walkers, self._polite = [Walker(s) for s in strolls], polite
-        self.clocks = np.zeros(len(strolls))
-        self.places = np.array([w.place(0.0) for w in self._walkers]).reshape(-1, 4)
+    def __init__(
+        self, strolls: Sequence[Stroll], walks: Walks | None = None, *, polite: bool = False, eye: float = EYE
+    ) -> None:
+        """
+        Args:
+          walks: of the house; without, people look at nobody, and step aside for nobody.
+          polite: they stand while somebody is within ABOUT before them, and after PATIENCE walk around who is in their
+            way, where there is room for that.
+          eye: metres above the floor that they look at.
+        """
+        self._walkers, self._walks, self._polite = [Walker(s) for s in strolls], walks, polite
+        self._around: list[tuple[Sequence[ErrandLeg], float] | None] = [None for _ in strolls]
+        self._eye, self._met = np.array([0.0, 0.0, eye]), np.full(3, np.inf)
+        self.clocks, self._waited, self._still = np.zeros((3, len(strolls)))
+        self.places = self._now()
         """(n, 4) x, y and z, metres, world, and heading, radians."""
 
     def go_on(self, seconds: float, begin: np.ndarray, end: np.ndarray) -> float:
@@ -93,8 +114,19 @@ class Crowd:
         before, to = self.places, begin - self.places[:, :3]
         ahead = (to[:, :2] * np.stack([np.cos(before[:, 3]), np.sin(before[:, 3])], 1)).sum(1)
         waits = self._polite & (np.linalg.norm(to, axis=1) < ABOUT) & (ahead > 0)
+        for k in np.flatnonzero(waits):
+            if self._around[k] is not None:
+                rest = self._leg(k).ahead(self.clocks[k])[:, 1:4]
+                waits[k] = np.linalg.norm(rest - begin, axis=1).min() < BODY_GAP - WAY_STEP / 2
+        self._waited = np.where(waits, self._waited + seconds, 0.0)
+        self._still = np.clip(self._still + np.where(waits, 2.0, -2.0) * seconds, 0.0, 1.0)
+        for k in np.flatnonzero(self._waited > PATIENCE):
+            self._step_aside(k, end)
         self.clocks = self.clocks + np.where(waits, 0.0, seconds)
-        self.places = np.array([w.place(t) for w, t in zip(self._walkers, self.clocks)]).reshape(-1, 4)
+        for k, around in enumerate(self._around):
+            if around is not None and self.clocks[k] >= around[0][-1].end:
+                self.clocks[k], self._around[k] = around[1], None
+        self.places, self._met = self._now(), end + self._eye
         way = (self.places - before)[:, :3] - (end - begin)
         share = np.clip((to * way).sum(1) / np.maximum((way * way).sum(1), 1e-12), 0.0, 1.0)
         return float(np.linalg.norm(to - share[:, None] * way, axis=1).min(initial=math.inf))
@@ -102,13 +134,66 @@ class Crowd:
     @property
     def openness(self) -> dict[str, float]:
         """How far people have opened doors that are closed at rest."""
-        return {i: x for w, t in zip(self._walkers, self.clocks) for i, x in w.openness(t).items()}
+        times = [t if a is None else min(t, a[1]) for t, a in zip(self.clocks, self._around)]
+        return {i: x for w, t in zip(self._walkers, times) for i, x in w.openness(t).items()}
 
     @property
     def moment(self) -> Moment:
         """Everybody as they are now, by person, and the doors that they open."""
-        figures = {w.person: w.figure(t) for w, t in zip(self._walkers, self.clocks)}
-        return Moment(openness=self.openness, people=figures)
+        now = Moment(openness=self.openness, people={w.person: self._figure(k) for k, w in enumerate(self._walkers)})
+        return now if self._walks is None else noticing(now, self._met, self._walks.house)
+
+    def _leg(self, k: int) -> ErrandLeg:
+        around, now = self._around[k], self.clocks[k]
+        return self._walkers[k].leg(now) if around is None else next(x for x in around[0] if now <= x.end)
+
+    def _now(self) -> np.ndarray:
+        at = (self._leg(k).place(t) for k, t in enumerate(self.clocks))
+        return np.array([(*place, heading) for place, heading in at]).reshape(-1, 4)
+
+    def _figure(self, k: int) -> MovingPerson:
+        leg = self._leg(k)
+        posed = solved(leg.course.limbs, leg.bearing(self.clocks[k]))
+        if self._still[k]:
+            stands = solved(leg.course.limbs, leg.course.limbs.standing(self.places[k, :3], self.places[k, 3]))
+            posed = between(posed, stands, smooth(self._still[k]))
+        return MovingPerson(self._walkers[k].person, *posed)
+
+    def _step_aside(self, k: int, other: np.ndarray) -> None:
+        """Go on around who stands at (x, y, z), where the free floor of rooms that are open allows that."""
+        leg, now, walks = self._leg(k), self.clocks[k], self._walks
+        rest = leg.ahead(now)
+        if walks is None or leg.door or np.ptp(rest[:, 3]) > 0:
+            return
+        (_, *here, heading), (_, *there, facing), ground = rest[0], rest[-1], walks.ground
+        bodies = shapely.MultiPoint(ground.plane(np.array([other, *np.delete(self.places[:, :3], k, axis=0)])))
+        closed = [s.meets(ground.xyz) for s in walks.swings if not s.meets(rest[:, 1:4]).any()]
+        shut = np.any([shapely.dwithin(shapely.points(ground.xy), bodies, BODY_GAP + WAY_STEP), *closed], axis=0)
+        begin, end = ground.cells_at(np.array([here, there]))
+        ways = ground.wide_ways(np.array([end]), shut)
+        if shut[end] or ways.metres[begin] > rest[-1, 0] - rest[0, 0] + DETOUR:
+            return
+        ends = ground.plane(np.array([here, there]))
+        line = walks.line(np.concatenate([ends[:1], ground.xy[ways.cells(begin)], ends[1:]]), others=bodies)
+        legs, _ = legs_along(leg.course.limbs, line, (), (), now, (heading, facing))
+        self._around[k] = legs, leg.end if self._around[k] is None else self._around[k][1]
+        self._waited[k] = self._still[k] = 0.0
+
+
+walks_of = functools.lru_cache(16)(Walks)
+_sight = functools.lru_cache(16)(sight_floor)
+
+
+def noticing(moment: Moment, eye: np.ndarray, house: House) -> Moment:
+    """The moment in which people look at (3,) an eye that is near and in sight."""
+    storey = sum(s.elevation < eye[2] for s in house.storeys[1:])
+    figures = dict(moment.people)
+    for name, f in moment.people.items():
+        at = np.array(f.place.position)
+        line, near = shapely.LineString([eye[:2], at[:2]]), np.linalg.norm(eye[:2] - at[:2]) < NOTICED
+        if near and _sight(house, storey).covers(line):
+            figures[name] = looking(f, eye)
+    return dataclasses.replace(moment, people=figures)
 
 
 def who_is_about(house: House, count: int, *, rng: np.random.Generator) -> list[str]:
