@@ -114,13 +114,13 @@ class Crowd:
         before, to = self.places, begin - self.places[:, :3]
         ahead = (to[:, :2] * np.stack([np.cos(before[:, 3]), np.sin(before[:, 3])], 1)).sum(1)
         waits = self._polite & (np.linalg.norm(to, axis=1) < ABOUT) & (ahead > 0)
-        for k in np.flatnonzero(waits):
+        for k in np.flatnonzero(waits).tolist():
             if self._around[k] is not None:
                 rest = self._leg(k).ahead(self.clocks[k])[:, 1:4]
                 waits[k] = np.linalg.norm(rest - begin, axis=1).min() < BODY_GAP - WAY_STEP / 2
         self._waited = np.where(waits, self._waited + seconds, 0.0)
         self._still = np.clip(self._still + np.where(waits, 2.0, -2.0) * seconds, 0.0, 1.0)
-        for k in np.flatnonzero(self._waited > PATIENCE):
+        for k in np.flatnonzero(self._waited > PATIENCE).tolist():
             self._step_aside(k, end)
         self.clocks = self.clocks + np.where(waits, 0.0, seconds)
         for k, around in enumerate(self._around):
@@ -176,7 +176,7 @@ class Crowd:
         ends = ground.plane(np.array([here, there]))
         line = walks.line(np.concatenate([ends[:1], ground.xy[ways.cells(begin)], ends[1:]]), others=bodies)
         legs, _ = legs_along(leg.course.limbs, line, (), (), now, (heading, facing))
-        self._around[k] = legs, leg.end if self._around[k] is None else self._around[k][1]
+        self._around[k] = legs, (self._around[k] or (legs, leg.end))[1]
         self._waited[k] = self._still[k] = 0.0
 
 

@@ -291,8 +291,8 @@ def _add_parts(spec: mujoco.MjSpec, bodied: Sequence[tuple[Part, Hung | None]]) 
         material, rgba = looks.of(part.mesh.finish)
         pose = {"pos": part.position, "quat": yaw_quat(part.yaw)} if carrier is None else {"pos": carrier.origin}
         body = spec.worldbody if carrier is None else carrier.body
-        pose["group"] = VISUAL - part.detail
-        _draw(body, f"{part.owner}#{k}", meshes[part.mesh_key], material, rgba, **pose)
+        group = VISUAL - part.detail
+        _draw(body, f"{part.owner}#{k}", meshes[part.mesh_key], material, rgba, **pose, group=group)
 
 
 def _draw(body: mujoco.MjsBody, name: str, mesh: str, material: str, rgba: Sequence[float], **pose: Any) -> None:
