@@ -117,7 +117,7 @@ class Crowd:
         for k in np.flatnonzero(waits).tolist():
             if self._around[k] is not None:
                 rest = self._leg(k).ahead(self.clocks[k])[:, 1:4]
-                waits[k] = np.linalg.norm(rest - begin, axis=1).min() < BODY_GAP - WAY_STEP / 2
+                waits[k] = np.linalg.norm(rest - begin, axis=1).min() < BODY_GAP
         self._waited = np.where(waits, self._waited + seconds, 0.0)
         self._still = np.clip(self._still + np.where(waits, 2.0, -2.0) * seconds, 0.0, 1.0)
         for k in np.flatnonzero(self._waited > PATIENCE).tolist():
@@ -161,22 +161,23 @@ class Crowd:
 
     def _step_aside(self, k: int, other: np.ndarray) -> None:
         """Go on around who stands at (x, y, z), where the free floor of rooms that are open allows that."""
-        leg, now, walks = self._leg(k), self.clocks[k], self._walks
-        rest = leg.ahead(now)
-        if walks is None or leg.door or np.ptp(rest[:, 3]) > 0:
+        leg, now, walks, around = self._leg(k), self.clocks[k], self._walks, self._around[k]
+        rest, last = leg.ahead(now), leg if around is None else around[0][-1]
+        (_, *here, heading), (_, *there, facing) = rest[0], last.course.line[-1]
+        if walks is None or leg.door or np.ptp(rest[:, 3]) > 0 or math.dist(here, there) < 2 * BODY_GAP:
             return
-        (_, *here, heading), (_, *there, facing), ground = rest[0], rest[-1], walks.ground
+        ground, longest = walks.ground, rest[-1, 0] - rest[0, 0] + math.dist(rest[-1, 1:4], there) + DETOUR
         bodies = shapely.MultiPoint(ground.plane(np.array([other, *np.delete(self.places[:, :3], k, axis=0)])))
         closed = [s.meets(ground.xyz) for s in walks.swings if not s.meets(rest[:, 1:4]).any()]
         shut = np.any([shapely.dwithin(shapely.points(ground.xy), bodies, BODY_GAP + WAY_STEP), *closed], axis=0)
         begin, end = ground.cells_at(np.array([here, there]))
         ways = ground.wide_ways(np.array([end]), shut)
-        if shut[end] or ways.metres[begin] > rest[-1, 0] - rest[0, 0] + DETOUR:
+        if shut[end] or ways.metres[begin] > longest:
             return
         ends = ground.plane(np.array([here, there]))
         line = walks.line(np.concatenate([ends[:1], ground.xy[ways.cells(begin)], ends[1:]]), others=bodies)
         legs, _ = legs_along(leg.course.limbs, line, (), (), now, (heading, facing))
-        self._around[k] = legs, (self._around[k] or (legs, leg.end))[1]
+        self._around[k] = legs, leg.end if around is None else around[1]
         self._waited[k] = self._still[k] = 0.0
 
 
