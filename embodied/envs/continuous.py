@@ -211,9 +211,8 @@ class ContinuousEnv:
         self.position = self.ground.nearest_free(self.ground.plane(np.array(episode.start)))
         """(2,) metres, in the plane of `ground`."""
         self.yaw, self.tilt, self.collided, self.collisions, self.ended = episode.yaw, 0, False, 0, False
-        walks = walks_of(place.house) if episode.people else None
+        walks, self.contact = walks_of(place.house) if episode.people else None, False
         self.crowd = Crowd(episode.people, walks, polite=self.body.polite, eye=self.body.eye)
-        self.contact = False
         """The people, and whether the body touched one."""
         self._people = [self.crowd.places]
         self._actions: list[int] = []

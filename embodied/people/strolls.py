@@ -96,9 +96,8 @@ class Crowd:
     ) -> None:
         """
         Args:
-          walks: of the house; without, people look at nobody, and step aside for nobody.
-          polite: they stand while somebody is within ABOUT before them, and after PATIENCE walk around who is in their
-            way, where there is room for that.
+          walks: of the house; without, people look at nobody.
+          polite: they stand while somebody is within ABOUT before them, and after PATIENCE walk around them.
           eye: metres above the floor that they look at.
         """
         self._walkers, self._walks, self._polite = [Walker(s) for s in strolls], walks, polite
