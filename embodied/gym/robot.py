@@ -173,7 +173,7 @@ class RobotEnv(LiveEnv):
         self.body.metres, self._fallen, self._broken = 0.0, set[str](), set[str]()
         self.heights = {i: float(self.body.thing(i)[2]) for i in self.body.things}
         self._lowest = np.array([*self.heights.values()]) - FALLS
-        return self._look(), {"world": name, "request": self.goal.request, **self._facts()}
+        return self._look(), {"world": name, **self._facts()}
 
     def _begin(self, rng: np.random.Generator) -> int:
         """Draw the goal; returns the cell at which the robot starts."""
@@ -212,6 +212,7 @@ class RobotEnv(LiveEnv):
     def _facts(self) -> dict[str, Any]:
         body, success = self.body, float(self.succeeded)
         facts: dict[str, Any] = {
+            "request": self.goal.request,
             "success": success,
             "is_success": self.succeeded,
             "metres": body.metres,
