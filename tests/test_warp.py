@@ -6,15 +6,21 @@ import importlib
 import math
 import sys
 
+import mujoco
 import numpy as np
 import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, decibels, furnished, of_panes, smooth_pages
 
+from embodied.assets.people import people
 from embodied.errors import UnableError
+from embodied.house.moment import Moment, MovingPerson
+from embodied.people.gait import Limbs, solved, walk
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
 from embodied.scene.house_meshes import owners
+from embodied.scene.model import build_spec
+from embodied.scene.people import add_person, stand_people
 
 EYE = (2.5, 2.6, 1.2)
 SIZE = 64
@@ -127,3 +133,29 @@ def test_a_batch_larger_than_the_renderer_is_refused(warped):
         warped.views([EYE] * 7, [0.0] * 7)
     with pytest.raises(ValueError, match="sound"):
         warped.views([EYE], [0.0], sees=("sound",))
+
+
+def test_a_person_of_rigid_parts_walks_through_a_house_in_warps_physics_and_pushes_what_lies_there(house):
+    mujoco_warp, warp = pytest.importorskip("mujoco_warp"), pytest.importorskip("warp")
+    spec, person = build_spec(house, HandCatalogue(), parts=()), people()["mei"]
+    ball = spec.worldbody.add_body(name="ball", pos=[2.0, 2.0, 0.15])
+    ball.add_freejoint()
+    ball.add_geom(size=[0.15, 0, 0], mass=1)
+    add_person(spec, "mei", person)
+    spec.option.timestep = 0.005
+    model = spec.compile()
+    data, way = mujoco.MjData(model), np.linspace((1.0, 2.0, 0.0), (3.5, 2.0, 0.0), 60)
+    course = walk(limbs := Limbs(person), way, np.zeros(60))
+    moves, many = mujoco_warp.put_model(model), mujoco_warp.put_data(model, data)
+    for k in range(90):
+        moment = Moment(people={"mei": MovingPerson("mei", *solved(limbs, course.at(0.02 * k)))})
+        stand_people(model, data, moment)
+        many.mocap_pos = warp.array(data.mocap_pos[None], dtype=warp.vec3)
+        many.mocap_quat = warp.array(data.mocap_quat[None], dtype=warp.quat)
+        for _ in range(4):
+            mujoco_warp.step(moves, many)
+    places = many.xpos.numpy()[0]
+    assert np.linalg.norm(places[model.body("ball").id][:2] - [2.0, 2.0]) > 0.3
+    assert (
+        np.linalg.norm(places[model.body("mei/chest").id] - data.mocap_pos[model.body("mei/chest").mocapid[0]]) < 0.05
+    )
