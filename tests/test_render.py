@@ -13,8 +13,10 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
 from embodied import gl
+from embodied.assets.catalogue import load_catalogue
+from embodied.house.house import Placement
 from embodied.light.settings import QUALITIES
-from embodied.render import visibility
+from embodied.render import geoms, visibility
 from embodied.render.camera import face_cameras
 from embodied.render.classic import Renderer
 from embodied.render.geoms import RayCaster
@@ -244,3 +246,20 @@ def test_a_forked_worker_is_told_to_spawn(renderer):
     worker.start()
     assert "spawn" in queue.get(timeout=600)
     worker.join(timeout=600)
+
+
+def test_people_who_are_small_in_a_picture_have_fewer_triangles_and_cover_the_same_pixels(monkeypatch):
+    catalogue, key = load_catalogue(), "people/anna_waiting"
+    size = catalogue.assets[key].size
+    person = Placement("person_1", key, "person", "living_room_1", (4.0, 2.0, 0.0), 0.0, size)
+    house, seen = dataclasses.replace(two_rooms(), placements=(person,)), []
+    with Renderer(house, catalogue) as r:
+        meshes = r._drawing._scene.model.mesh_facenum
+        for pixels in (geoms.PERSON_PIXELS, (9.0, 9.0)):
+            monkeypatch.setattr(geoms, "PERSON_PIXELS", pixels)
+            seen.append(r.view((1.0, 2.0, 1.5), 0.0, -0.2, 1.0, (120, 160)))
+            drawn = r._drawing._drawn
+            seen.append(sum(meshes[g.dataid // 2] for g in drawn.geoms[: drawn.ngeom] if g.dataid >= 0))
+    far, few, near, many = seen
+    both, either = (f(far.ids == 1, near.ids == 1).sum() for f in (np.logical_and, np.logical_or))
+    assert few < many - 8000 and both > 0.9 * either > 300

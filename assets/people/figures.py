@@ -13,8 +13,9 @@ from embodied.assets.records import Asset, MeshPart, Size
 def _make(
     person: PersonModel, usual: str, size: Size, params: Sequence[tuple[str, str | float]], finish: FinishOf
 ) -> tuple[MeshPart, ...]:
-    parts = posed(person, still_pose(person, pose := str(dict(params).get("pose", usual))), finish=finish)
-    return fitted(parts, size) if pose == usual else parts
+    pose, detail = (str(dict(params).get(k, v)) for k, v in (("pose", usual), ("detail", 0)))
+    shown, *fine = (posed(person, still_pose(person, pose), d, finish=finish) for d in sorted({int(detail), 0})[::-1])
+    return fitted((*shown, *sum(fine, ())), size)[: len(shown)] if pose == usual else shown
 
 
 def _figure(person: PersonModel, pose: str) -> ParametricAsset:

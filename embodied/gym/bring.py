@@ -20,6 +20,7 @@ from embodied.gym import robot
 from embodied.house.moment import MovingPerson
 from embodied.navigation.free_space import EYE
 from embodied.people.gait import Limbs, solved, walk
+from embodied.people.strolls import noticing
 from embodied.seeds import stream
 from embodied.tasks.ask import look_of
 
@@ -97,9 +98,8 @@ class BringEnv(robot.RobotEnv):
         alike = [of[i] for i in sorted(self.body.things) if of[i].object_class == p.object_class]
         fits = tuple(q.id for q in alike if look(q)[:1] == look(p)[:1])
         others = tuple(q.id for q in alike if q.id not in fits)
-        eye = np.array([*self.body.position, house.storeys[0].elevation + EYE])
         turn = round(self.body.yaw / interface.STEP) % interface.TURNS
-        pose = interface.Pose(int(np.linalg.norm(graph.positions - eye, axis=1).argmin()), turn)
+        pose = interface.Pose(int(np.linalg.norm(graph.positions - self._eye, axis=1).argmin()), turn)
         away = np.linalg.norm(graph.positions[:, :2] - at[:2], axis=1)
         goals = (int((away + 99.0 * (np.array(graph.room_of_node) != p.room)).argmin()),)
         goal = interface.FindDescribed(p.object_class, thing, fits, others, look(p)[:1])
@@ -112,6 +112,10 @@ class BringEnv(robot.RobotEnv):
         nothing, main = interface.Candidates(none, none, none, none), interface.Mode.MAIN
         return interface.Situation(place, task, pose, main, goals, None, (), nothing, 0, 0, extras=truth)
 
+    @property
+    def _eye(self) -> np.ndarray:
+        return np.array([*self.body.position, self.world.house.storeys[0].elevation + EYE])
+
     def room_at(self, point: np.ndarray) -> str:
         """The room of the floor nearest to a point."""
         away = np.linalg.norm(self.ground.xy - point[:2], axis=1) + 9.0 * (self.ground.room_of_cell == "")
@@ -120,7 +124,8 @@ class BringEnv(robot.RobotEnv):
     def _look(self) -> dict[str, Any]:
         if self.settings.observations and self.world.pictures.quality is not None:
             posed = solved(self._walk.limbs, self._walk.at(max(self.time - STAYS, 0.0)))
-            self.world.show(dataclasses.replace(self.world.moment, people={"person": MovingPerson(self._name, *posed)}))
+            now = dataclasses.replace(self.world.moment, people={"person": MovingPerson(self._name, *posed)})
+            self.world.show(noticing(now, self._eye, self.world.house))
         return super()._look()
 
     def _facts(self) -> dict[str, Any]:

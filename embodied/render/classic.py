@@ -27,7 +27,7 @@ from embodied.render.supersampling import averaged, drawn_size
 from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.joinery import leaf_poses
 from embodied.scene.lit_pages import ANYWHERE, LitMesh, LitPages
-from embodied.scene.model import compile_scene, drawn_meshes, give_memory_back
+from embodied.scene.model import compile_scene, drawn_meshes, give_memory_back, hollow_things
 from embodied.scene.part import Part
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class Renderer:
             if lit is None:
                 self._rasterise(_bare_meshes(house_parts(house, catalogue)), BARE, copied=False)
             else:
-                self._rasterise([m for _, m in drawn_meshes(lit, house)], lit.pages)
+                self._rasterise([m for _, m in drawn_meshes(lit, house, twice=False)], lit.pages)
         else:
             scene = compile_scene(house, catalogue, collisions=False, lit=lit)
             samples = 0 if self._software else MULTISAMPLES
@@ -117,7 +117,9 @@ class Renderer:
 
         number = {name: i + 1 for i, name in enumerate(self.owners)}
         ids = np.array([number.get(m.owner, 0) for m in meshes], np.int32)
-        self._drawing = raster.Raster(meshes, ids, pages, copied=copied, moving=moving)
+        things = hollow_things(self.house)
+        hollow = [i for i, m in enumerate(meshes) if m.owner in things]
+        self._drawing = raster.Raster(meshes, ids, pages, copied=copied, moving=moving, hollow=hollow)
         self._list(ids, [m.kind for m in meshes], [m.room for m in meshes])
 
     def _list(self, ids: np.ndarray, kinds: Sequence[str], rooms: Sequence[str]) -> None:
@@ -141,7 +143,7 @@ class Renderer:
             raise gl.GLError("what moves in a lit house is drawn by OpenGL 4.5 or later, and this one is older")
         self._open().close()
         self.owners, self._overlay = tuple(owners), overlay
-        drawn = list(drawn_meshes(lit, self.house))
+        drawn = list(drawn_meshes(lit, self.house, twice=False))
         self._numbers = {i: k for k, (i, _) in enumerate(drawn) if i in set(moving)}
         self._rasterise([m for _, m in drawn], lit.pages, moving=list(self._numbers.values()))
 

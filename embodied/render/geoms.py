@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 HIDDEN = 5
 """Geom group of what is left out."""
+PERSON_PIXELS = (0.005, 0.014)
+"""Metres on a person that a pixel is wide from which on details 1 and 2 are drawn."""
 NUMBERS = [mujoco.mjtRndFlag.mjRND_SEGMENT.value, mujoco.mjtRndFlag.mjRND_IDCOLOR.value]
 """Flags of a scene that paint every geom in its number's colour."""
 
@@ -58,6 +60,10 @@ class Geoms:
         self._groups = model.geom_group.copy()
         self.middles, self.reaches = world_boxes(model, self._data)
         self._rest = model.geom_pos.copy(), model.geom_quat.copy()
+        copied = sorted({*scene.owner_of_geom[self._groups < VISUAL]} - {0})
+        whose = lambda owner, group: np.flatnonzero((scene.owner_of_geom == owner) & (self._groups == group))
+        self._copies = [[whose(owner, VISUAL - detail) for detail in range(3)] for owner in copied]
+        """By person and detail, geoms."""
 
     def turn(self, turns: Mapping[str, tuple[np.ndarray, float]]) -> None:
         """Turn geoms about vertical axes from where they were at first; those that are not named go back there.
@@ -84,7 +90,7 @@ class Geoms:
 
     def depth_and_ids(self, camera: Camera, size: Pixels, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(h, w) float32 metres along the optical axis and (h, w) int32, bottom row first; as in `rgb`."""
-        self._choose(camera, size, chosen)
+        chosen = self._choose(camera, size, chosen)
         flags = self._drawn.flags
         flags[NUMBERS] = 1
         rect, numbers = mujoco.MjrRect(0, 0, size[1], size[0]), np.empty((*size, 3), np.uint8)
@@ -109,12 +115,19 @@ class Geoms:
         """Free what lies on the graphics side."""
         self._mjr.free()
 
-    def _choose(self, camera: Camera, size: Pixels, chosen: np.ndarray) -> None:
-        """Prepare OpenGL and the list of geoms to draw."""
+    def _choose(self, camera: Camera, size: Pixels, chosen: np.ndarray) -> np.ndarray:
+        """Prepare OpenGL and the list of geoms to draw, which it returns; of people who are small, copies."""
         mujoco.mjr_restoreBuffer(self._mjr)
         if any(n > b for n, b in zip(size, self._buffer, strict=True)):
             self._buffer = max(size[0], self._buffer[0]), max(size[1], self._buffer[1])
             mujoco.mjr_resizeOffscreen(self._buffer[1], self._buffer[0], self._mjr)
+        forward, wide = np.array(camera.forward), 2 * math.tan(camera.vfov / 2) / size[0]
+        for copies in self._copies:
+            if (here := np.isin(chosen, copies[0])).any():
+                apart = self.middles[copies[0]] - np.array(camera.position)
+                near = float((apart @ forward - self.reaches[copies[0]] @ np.abs(forward)).min())
+                chosen = np.concatenate([chosen[~here], copies[int(np.searchsorted(PERSON_PIXELS, near * wide))]])
+        chosen.sort()
         model = self._scene.model
         model.geom_group[:] = HIDDEN
         model.geom_group[chosen] = VISUAL
@@ -123,6 +136,7 @@ class Geoms:
         )
         model.geom_group[:] = self._groups
         self._aim(camera, size)
+        return chosen
 
     def _aim(self, camera: Camera, size: Pixels) -> None:
         """Write `camera` into both eyes of the scene."""

@@ -1,9 +1,12 @@
 """The one translation from a House to triangles: everything visible as a tuple of Parts."""
 
+import dataclasses
 import typing
+from collections.abc import Sequence
 
+from embodied.assets.people.figures import FIGURES
 from embodied.assets.records import Finish, MeshPart
-from embodied.house.house import House
+from embodied.house.house import House, Placement
 from embodied.scene.part import Part
 from embodied.scene.shell import shell_owners, shell_parts
 
@@ -28,8 +31,21 @@ def house_parts(house: House, catalogue: Meshes, apart: bool = False) -> tuple[P
 
 def object_parts(house: House, catalogue: Meshes) -> tuple[Part, ...]:
     """The placements alone."""
+    return _parts_of(house.placements, catalogue)
+
+
+def coarser_people(house: House, catalogue: Meshes) -> tuple[Part, ...]:
+    """The figures of the pack among the placements in details 1 and 2."""
+    some, more = [p for p in house.placements if p.asset in FIGURES], list[Part]()
+    for detail in (1, 2):
+        less = [dataclasses.replace(p, params=(*p.params, ("detail", detail))) for p in some]
+        more += (dataclasses.replace(x, detail=detail) for x in _parts_of(less, catalogue))
+    return tuple(more)
+
+
+def _parts_of(placements: Sequence[Placement], catalogue: Meshes) -> tuple[Part, ...]:
     parts = []
-    for p in house.placements:
+    for p in placements:
         stem = "/".join([p.asset, *(f"{s:.4f}" for s in p.size), *(f"{k}={v}" for k, v in p.params)])
         for i, mesh in enumerate(catalogue.mesh(p.asset, p.size, p.params)):
             parts.append(Part(p.id, "object", p.room, mesh, f"{stem}#{i}", p.position, p.yaw))

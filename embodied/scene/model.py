@@ -1,6 +1,7 @@
 """House to MjSpec to MjModel: the only translation. Every geom knows whose it is.
 
-Visual geoms are in group 2 and touch nothing; collision boxes are in group 3 and are not drawn.
+Visual geoms are in group 2 and touch nothing, the coarser copies that a renderer has of people in groups 1 and 0;
+collision boxes are in group 3 and are not drawn.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from embodied.house.moment import RigidPose
 from embodied.scene import backdrop, collision, cupboards, doors, far_canvas, stairs
 from embodied.scene.cupboards import Case
 from embodied.scene.doors import Hung
-from embodied.scene.house_meshes import Part, house_parts, owners
+from embodied.scene.house_meshes import Part, coarser_people, house_parts, owners
 from embodied.scene.landscapes import scenery_of
 from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.roof import ceiling_boxes
@@ -82,7 +83,7 @@ class Scene:
     owner_of_geom: np.ndarray
     """(ngeom,) int32 instance id of every geom; 0 for geoms that nobody owns."""
     kind_of_geom: tuple[str, ...]
-    """Part.kind of every geom; 'collision' for collision boxes."""
+    """Part.kind of every geom; 'collision' for collision boxes and coarser copies."""
     room_of_geom: tuple[str, ...]
     """Part.room of every geom; '' for the outdoors and for collision boxes of the shell."""
 
@@ -94,7 +95,7 @@ def compile_scene(house: House, catalogue: Catalogue, *, collisions: bool = True
       collisions: False leaves the collision boxes out, which a renderer does not need.
       lit: draw these pages instead of the house's own materials.
     """
-    parts = house_parts(house, catalogue) if lit is None else ()
+    parts = (*house_parts(house, catalogue), *coarser_people(house, catalogue)) if lit is None else ()
     spec = build_spec(house, catalogue, collisions=collisions, lit=lit, parts=parts)
     model, names = compile_spec(spec), owners(house)
     del spec
@@ -290,13 +291,14 @@ def _add_parts(spec: mujoco.MjSpec, bodied: Sequence[tuple[Part, Hung | None]]) 
         material, rgba = looks.of(part.mesh.finish)
         pose = {"pos": part.position, "quat": yaw_quat(part.yaw)} if carrier is None else {"pos": carrier.origin}
         body = spec.worldbody if carrier is None else carrier.body
-        _draw(body, f"{part.owner}#{k}", meshes[part.mesh_key], material, rgba, **pose)
+        group = VISUAL - part.detail
+        _draw(body, f"{part.owner}#{k}", meshes[part.mesh_key], material, rgba, **pose, group=group)
 
 
 def _draw(body: mujoco.MjsBody, name: str, mesh: str, material: str, rgba: Sequence[float], **pose: Any) -> None:
     """A visual geom: it touches nothing and weighs nothing."""
     kind = {"type": mujoco.mjtGeom.mjGEOM_MESH, "group": VISUAL, "contype": 0, "conaffinity": 0, "mass": 0}
-    body.add_geom(name=name, **kind, meshname=mesh, material=material, rgba=rgba, **pose)
+    body.add_geom(name=name, **{**kind, **pose}, meshname=mesh, material=material, rgba=rgba)
 
 
 def _is_drawable(mesh: MeshPart) -> bool:
@@ -445,10 +447,10 @@ def _add_insides(spec: mujoco.MjSpec, cases: Mapping[str, Case], lying: Sequence
             _draw(carrier.body, f"{part.owner}#{name}", name, PROBE_LIT, rgba, pos=carrier.origin)
 
 
-def drawn_meshes(lit: LitPages, house: House) -> Iterator[tuple[int, LitMesh]]:
+def drawn_meshes(lit: LitPages, house: House, twice: bool = True) -> Iterator[tuple[int, LitMesh]]:
     """The meshes of a lit house as they are drawn, each with its number in LitPages.meshes: those of HOLLOW things
-    seen from inside, too; what stands around the house in pieces, of which a window shows few."""
-    hollow = {p.id for p in house.placements if p.object_class in HOLLOW}
+    with their backs, unless not `twice`; what stands around the house in pieces, of which a window shows few."""
+    hollow = hollow_things(house) if twice else ()
     low, high = bounds_of(house)
     for i, mesh in enumerate(lit.meshes):
         for vertices, uv, faces in _pieces(mesh, (low + high) / 2):
@@ -456,6 +458,11 @@ def drawn_meshes(lit: LitPages, house: House) -> Iterator[tuple[int, LitMesh]]:
                 faces = np.concatenate([faces, faces[:, ::-1] + len(vertices)])
                 vertices, uv = np.concatenate([vertices, vertices]), np.concatenate([uv, uv])
             yield i, dataclasses.replace(mesh, vertices=vertices, uv=uv, faces=faces)
+
+
+def hollow_things(house: House) -> frozenset[str]:
+    """Ids of the placements that are seen from inside, too."""
+    return frozenset(p.id for p in house.placements if p.object_class in HOLLOW)
 
 
 def bounds_of(house: House) -> tuple[np.ndarray, np.ndarray]:

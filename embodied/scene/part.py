@@ -21,3 +21,5 @@ class Part:
     """Position of the mesh's origin, world, metres."""
     yaw: float = 0.0
     """Turn about z, radians counter-clockwise."""
+    detail: int = 0
+    """Of people: 0, or of copies that are drawn where they are small in a picture, 1 and 2 (`posed`)."""
