@@ -14,16 +14,8 @@ import torch
 import torch.nn.functional as F
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.agents.common import imitation
+from embodied.agents.common import imitation, session
 from embodied.agents.common.imitation import About, SightedAgent, Supervised, play_with_memory
-from embodied.agents.common.session import (
-    Note,
-    descend,
-    episode_seed,
-    seeded_dropout,
-    set_learning_rate,
-    tasks_of_update,
-)
 from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.tensors import choose_sampled
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
@@ -138,27 +130,29 @@ class FindLearner(imitation.ImitationLearner):
             self.network.eval()
             searches, numbers = self._search(update)
         self.network.train()
-        with seeded_dropout(c.seed, update):
-            set_learning_rate(self.optimizer, c.learning_rate, update, c.iterations, c.cooldown)
+        with session.seeded_dropout(c.seed, update):
+            session.set_learning_rate(self.optimizer, c.learning_rate, update, c.iterations, c.cooldown)
             seen = stream(c.seed, "looks", update).integers(len(self._labels.seen), size=LOOKS)
             loss = self._labels.loss(self.network, torch.from_numpy(seen))
             numbers["reading"] = float(loss.detach())
             if searches:
                 imitated, right = imitation_loss(self.network, searches)
                 loss, numbers["loss"], numbers["right"] = loss + imitated, float(imitated.detach()), float(right)
-            numbers["gradient"] = descend(loss, self.optimizer, f"update {update}", CLIP)
+            numbers["gradient"] = session.descend(loss, self.optimizer, f"update {update}", CLIP)
         return numbers
 
     def _search(self, update: int) -> tuple[list[Search], dict[str, float]]:
         """Whole episodes, watched by a teacher."""
         c, split = self.config, self.training
         policy = Supervised(dataclasses.replace(self.agent.policy(split.bank), choose=choose_sampled))
-        tasks = tasks_of_update(split.tasks, update, c.batch, c.seed)
-        episodes, searches = play_with_memory(split.make_env, policy, tasks, seed=episode_seed(c.seed, update))
+        tasks = session.tasks_of_update(split.tasks, update, c.batch, c.seed)
+        episodes, searches = play_with_memory(split.make_env, policy, tasks, seed=session.episode_seed(c.seed, update))
         return list(searches.values()), imitation.played(episodes, split.worlds)
 
 
-def train_finder(source: TrainingData, config: FinderConfig, folder: Path, cache: Path, *, note: Note = print) -> None:
+def train_finder(
+    source: TrainingData, config: FinderConfig, folder: Path, cache: Path, *, note: session.Note = print
+) -> None:
     """Train, or go on training, an agent; writes best.safetensors and what embodied.agents.common.session writes."""
     training = find_split(source, "train", HOUSE_TASKS, config.training_houses or None)
     validation = find_split(source, "val_unseen", -(-config.validation_tasks // len(source.data.names("val_unseen"))))
@@ -232,7 +226,7 @@ def labels_of(data: Dataset, split: Split, classes: Sequence[str], cache: Path) 
     return Labels(*(torch.cat(x) for x in zip(*parts, strict=True)))
 
 
-def explorer_of(learner: FindLearner, validation: Split, *, note: Note) -> Finder:
+def explorer_of(learner: FindLearner, validation: Split, *, note: session.Note) -> Finder:
     """The finder that explores, with patience and bar chosen in validation houses, once its readers have learned."""
     finder, explorer = learner.agent, learner.network
     for update in range(learner.config.iterations):
@@ -274,7 +268,7 @@ class FindStudy(SightedStudy):
     def seeds(self, row: StudyRow) -> Sequence[int]:
         return self.repeats if row.label in SEVERAL else self.repeats[:1]
 
-    def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
+    def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: session.Note) -> Path:
         train_finder(self.training_data(), self.settings(train, seed), home, self.cache, note=note)
         return home / "best.safetensors"
 

@@ -20,22 +20,13 @@ from embodied.datasets.build import whole_folder
 from embodied.datasets.folders import write_lines
 from embodied.datasets.habitat import with_experts, write_vlnce
 from embodied.datasets.lerobot import STEP_COLUMNS, Columns, Writer
-from embodied.envs.continuous import (
-    POSITION,
-    CameraConfig,
-    ContinuousEnv,
-    ContinuousEpisode,
-    ContinuousTrajectory,
-    HabitatAction,
-    ShortestPathFollower,
-    odometry,
-)
+from embodied.envs import continuous
 from embodied.render.camera import camera_at
 from embodied.seeds import stream
 from embodied.world import World
 
 FORMATS = ("vlnce", "lerobot-vlnce")
-SQUARE = CameraConfig()
+SQUARE = continuous.CameraConfig()
 STEPS = 4
 """Steps a second of LeRobot's data."""
 
@@ -47,7 +38,7 @@ Chosen = Callable[[int], int]
 class Taught:
     """A walk and what the expert would have done before each of its actions."""
 
-    trajectory: ContinuousTrajectory
+    trajectory: continuous.ContinuousTrajectory
     labels: tuple[int, ...]
     world: World
     eye: float
@@ -58,23 +49,28 @@ def noisy_actions(share: float, rng: np.random.Generator) -> Chosen:
     """The expert plays, but this share of its steps and turns is drawn among steps and turns instead."""
 
     def chosen(label: int) -> int:
-        return int(rng.integers(1, 4)) if label != HabitatAction.STOP and rng.random() < share else label
+        return int(rng.integers(1, 4)) if label != continuous.HabitatAction.STOP and rng.random() < share else label
 
     return chosen
 
 
-def teach(env: ContinuousEnv, episode: ContinuousEpisode, world: World, chosen: Chosen = lambda label: label) -> Taught:
+def teach(
+    env: continuous.ContinuousEnv,
+    episode: continuous.ContinuousEpisode,
+    world: World,
+    chosen: Chosen = lambda label: label,
+) -> Taught:
     """Play an episode, as the expert does unless told otherwise, and write down what the expert does at each of its
     states (Ross et al. 2011)."""
     env.reset(episode, world)
-    expert, labels = ShortestPathFollower(env, along=bool(episode.reference)), []
+    expert, labels = continuous.ShortestPathFollower(env, along=bool(episode.reference)), []
     while not env.ended:
         labels.append(expert.action())
         env.step(chosen(labels[-1]))
     return Taught(env.trajectory(), tuple(labels), world, env.body.eye)
 
 
-def frames(taught: Taught, camera: CameraConfig) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def frames(taught: Taught, camera: continuous.CameraConfig) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """(h, w, 3) uint8 and (h, w) float32 metres along the optical axis, before each action."""
     trajectory, size = taught.trajectory, (camera.height, camera.width)
     for (x, y, z), yaw in zip(trajectory.positions[:-1], trajectory.yaws[:-1], strict=True):
@@ -86,15 +82,15 @@ def frames(taught: Taught, camera: CameraConfig) -> Iterator[tuple[np.ndarray, n
 def export_walks(
     form: str,
     folder: Path,
-    episodes: Iterable[ContinuousEpisode],
+    episodes: Iterable[continuous.ContinuousEpisode],
     worlds: Mapping[str, World],
     *,
     seed: int,
-    camera: CameraConfig = SQUARE,
+    camera: continuous.CameraConfig = SQUARE,
     action_noise: float = 0.0,
     split: str = "train",
     depth: bool = False,
-    watch: Callable[[Iterable[ContinuousEpisode]], Iterable[ContinuousEpisode]] = iter,
+    watch: Callable[[Iterable[continuous.ContinuousEpisode]], Iterable[continuous.ContinuousEpisode]] = iter,
 ) -> int:
     """Play episodes and write them in one of FORMATS; returns how many steps there are.
 
@@ -114,17 +110,17 @@ def export_walks(
     chosen_episodes = list(episodes)
     if not chosen_episodes:
         raise ValueError("there are no episodes to play; choose another split")
-    env = ContinuousEnv()
+    env = continuous.ContinuousEnv()
     chosen = noisy_actions(action_noise, stream(seed, "wander"))
     taught = (teach(env, e, worlds[e.world], chosen) for e in watch(chosen_episodes))
     with whole_folder(folder) as draft:
         if form == "lerobot-vlnce":
             return _lerobot(draft, taught, camera, depth)
-        write_vlnce(draft, split, with_experts(chosen_episodes, worlds, ContinuousEnv()))
+        write_vlnce(draft, split, with_experts(chosen_episodes, worlds, continuous.ContinuousEnv()))
         return _samples(draft, taught, camera)
 
 
-def _samples(folder: Path, walks: Iterable[Taught], camera: CameraConfig) -> int:
+def _samples(folder: Path, walks: Iterable[Taught], camera: continuous.CameraConfig) -> int:
     lines: list[str] = []
     for t in walks:
         episode = t.trajectory.episode
@@ -143,19 +139,19 @@ SCORES = ("stop", "forward", "left", "right")
 """action: 1 for what the expert does, 0 for the others."""
 LEROBOT: Columns = {
     **STEP_COLUMNS,
-    "observation.state": (pa.list_(pa.float32(), len(POSITION)), POSITION),
+    "observation.state": (pa.list_(pa.float32(), len(continuous.POSITION)), continuous.POSITION),
     "action": (pa.list_(pa.float32(), len(SCORES)), SCORES),
 }
 
 
-def _lerobot(folder: Path, walks: Iterable[Taught], camera: CameraConfig, with_depth: bool) -> int:
+def _lerobot(folder: Path, walks: Iterable[Taught], camera: continuous.CameraConfig, with_depth: bool) -> int:
     writer = Writer(
         folder, (camera.height, camera.width), LEROBOT, key="observation.image", fps=STEPS, depth=with_depth
     )
     for t in walks:
         trajectory, episode, n = t.trajectory, t.trajectory.episode, len(t.labels)
         poses = zip(trajectory.positions[:-1], trajectory.yaws[:-1], trajectory.pitches[:-1], strict=True)
-        states = [odometry(episode, p, y, math.radians(tilt)) for p, y, tilt in poses]
+        states = [continuous.odometry(episode, p, y, math.radians(tilt)) for p, y, tilt in poses]
         scores = np.eye(len(SCORES), dtype=np.float32)[list(t.labels)]
         rows = {"observation.state": np.stack(states), "action": scores}
         rgb, depth = zip(*frames(t, camera), strict=True)

@@ -23,19 +23,7 @@ from gymnasium import spaces
 
 from embodied.assets.cache import default_cache
 from embodied.datasets.store import Dataset
-from embodied.envs.continuous import (
-    Body,
-    CameraConfig,
-    ContinuousEnv,
-    ContinuousEpisode,
-    ContinuousTrajectory,
-    HabitatAction,
-    NavMeshCache,
-    ShortestPathFollower,
-    check_on_floor,
-    odometry,
-    social_measures,
-)
+from embodied.envs import continuous
 from embodied.geometry import wrap
 from embodied.gym.drive import chosen_worlds
 from embodied.gym.env import VIEW, LiveEnv
@@ -71,7 +59,7 @@ class EpisodeSource:
     split: str
     seed: int
     cache: Path
-    navmeshes: NavMeshCache
+    navmeshes: continuous.NavMeshCache
 
 
 @dataclass(frozen=True)
@@ -82,11 +70,11 @@ class ContinuousTask:
     """The file's, or 'module:NAME' of one's own, so that it is found."""
     title: str
     """Gymnasium has it as embodied/TITLE-v0."""
-    read: Callable[[Path], list[ContinuousEpisode]] | None
+    read: Callable[[Path], list[continuous.ContinuousEpisode]] | None
     """The episodes of a file in Habitat's format; None where there is none."""
-    episodes: Callable[[EpisodeSource], list[ContinuousEpisode]]
-    body: Body = Body()
-    camera: CameraConfig = CameraConfig()
+    episodes: Callable[[EpisodeSource], list[continuous.ContinuousEpisode]]
+    body: continuous.Body = continuous.Body()
+    camera: continuous.CameraConfig = continuous.CameraConfig()
     gps: bool = False
     """Observations have gps and compass."""
     point: bool = False
@@ -111,11 +99,11 @@ class EpisodeDataset:
 
     task: ContinuousTask
     worlds: Mapping[str, World]
-    episodes: tuple[ContinuousEpisode, ...]
-    body: Body = Body()
-    camera: CameraConfig = CameraConfig()
+    episodes: tuple[continuous.ContinuousEpisode, ...]
+    body: continuous.Body = continuous.Body()
+    camera: continuous.CameraConfig = continuous.CameraConfig()
     observations: tuple[str, ...] = LIVE_CHANNELS
-    navmeshes: NavMeshCache = dataclasses.field(default_factory=NavMeshCache)
+    navmeshes: continuous.NavMeshCache = dataclasses.field(default_factory=continuous.NavMeshCache)
     opened: OrderedDict[str, World] = dataclasses.field(default_factory=OrderedDict)
 
     def __post_init__(self) -> None:
@@ -149,14 +137,14 @@ class ContinuousGymEnv(LiveEnv):
     def __init__(self, dataset: EpisodeDataset, *, render_mode: str | None = None) -> None:
         super().__init__(render_mode, dataset.opened.values())
         self.dataset = dataset
-        self.play = ContinuousEnv(dataset.body, dataset.navmeshes)
+        self.play = continuous.ContinuousEnv(dataset.body, dataset.navmeshes)
         """The pose of the body, and what is privileged: distance, ways, the walk so far."""
         self.action_space: gym.Space[Any] = spaces.Discrete(dataset.body.actions)
         self.observation_space = observation_space(dataset)
         self._max_episode_steps = dataset.body.steps
 
     @property
-    def episodes(self) -> tuple[ContinuousEpisode, ...]:
+    def episodes(self) -> tuple[continuous.ContinuousEpisode, ...]:
         """All episodes; reset(options={"episode": k}) plays number k."""
         return self.dataset.episodes
 
@@ -185,11 +173,11 @@ class ContinuousGymEnv(LiveEnv):
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         play, before = self.play, self.play.distance
         play.step(whole(action))
-        stopped, info = action == HabitatAction.STOP, self._facts()
+        stopped, info = action == continuous.HabitatAction.STOP, self._facts()
         if play.ended:
             info |= judged(play.trajectory())
             if play.episode.people:
-                info |= social_measures(play.trajectory(), self.dataset.body.steps)
+                info |= continuous.social_measures(play.trajectory(), self.dataset.body.steps)
             info["is_success"] = info["success"] > 0
         gain = FOLLOWING * play.is_following if play.episode.follows else PER_METRE * (before - play.distance)
         reward, ended = float(info["is_success"]) - STEP_COST - CONTACT_COST * play.contact, stopped or play.contact
@@ -217,11 +205,11 @@ class ContinuousGymEnv(LiveEnv):
 
     def odometry(self) -> np.ndarray:
         """(5,) float32 of embodied.envs.continuous.POSITION."""
-        return odometry(self.play.episode, np.array(self.play.eye), self.play.yaw, self.play.pitch)
+        return continuous.odometry(self.play.episode, np.array(self.play.eye), self.play.yaw, self.play.pitch)
 
-    def expert(self, *, along: bool = False) -> ShortestPathFollower:
+    def expert(self, *, along: bool = False) -> continuous.ShortestPathFollower:
         """Who knows the way from wherever the body is, for training."""
-        return ShortestPathFollower(self.play, along=along)
+        return continuous.ShortestPathFollower(self.play, along=along)
 
     def _picture(self) -> np.ndarray:
         camera = dataclasses.replace(self.dataset.camera, height=VIEW[0], width=VIEW[1])
@@ -302,7 +290,7 @@ def open_episodes(
     """
     task = continuous_task(kind)
     body, camera = chosen(task, changes)
-    where, navmeshes = Path(cache) if cache else default_cache(), NavMeshCache()
+    where, navmeshes = Path(cache) if cache else default_cache(), continuous.NavMeshCache()
     whole = Dataset(Path(data)) if data is not None and worlds is None else None
     worlds, _ = chosen_worlds(data=data, split=split, seed=seed, cache=where, pictures=pictures, worlds=worlds)
     if episodes is None:
@@ -314,14 +302,14 @@ def open_episodes(
         for e in (e for e in played if e.world in worlds):
             house = worlds[e.world].house
             try:
-                check_on_floor(e, house, navmeshes.of(house), body.forward)
+                continuous.check_on_floor(e, house, navmeshes.of(house), body.forward)
             except ValueError as error:
                 raise ValueError(f"{episodes}: {error}") from error
     seen = (observations,) if isinstance(observations, str) else tuple(observations)
     return EpisodeDataset(task, dict(worlds), tuple(played), body, camera, seen, navmeshes)
 
 
-def chosen(task: ContinuousTask, changes: Mapping[str, Any]) -> tuple[Body, CameraConfig]:
+def chosen(task: ContinuousTask, changes: Mapping[str, Any]) -> tuple[continuous.Body, continuous.CameraConfig]:
     """The body and the camera of a task with some fields changed.
 
     Raises:
@@ -338,7 +326,7 @@ WARPING = 3.0
 """Metres that nDTW is normalised by (Magalhaes et al. 2019)."""
 
 
-def ndtw(trajectory: ContinuousTrajectory) -> float:
+def ndtw(trajectory: continuous.ContinuousTrajectory) -> float:
     """exp(-DTW / (3 m |expert|)) of the positions after each action, without repeats; the episode needs a path."""
     reference = expert_path(trajectory.episode)
     after = trajectory.positions[1:] if len(trajectory.actions) else trajectory.positions
@@ -347,7 +335,7 @@ def ndtw(trajectory: ContinuousTrajectory) -> float:
     return float(np.exp(-warping(metres) / (len(reference) * WARPING)))
 
 
-def judged(trajectory: ContinuousTrajectory) -> dict[str, float]:
+def judged(trajectory: continuous.ContinuousTrajectory) -> dict[str, float]:
     """Every measure of one walk by the names of VLN-CE's and ObjectNav's evaluators (Krantz et al. 2020, Anderson et
     al. 2018); nDTW and SDTW where its episode has a path.
 
@@ -355,7 +343,7 @@ def judged(trajectory: ContinuousTrajectory) -> dict[str, float]:
     positions, nDTW and SDTW straight lines between positions and the expert's (exact dynamic time warping, where the
     published program may approximate it).
     """
-    t, steps = trajectory, sum(a == HabitatAction.FORWARD for a in trajectory.actions)
+    t, steps = trajectory, sum(a == continuous.HabitatAction.FORWARD for a in trajectory.actions)
     numbers = {"success": t.success, "spl": t.spl}
     if len(expert_path(t.episode)):
         numbers |= {"ndtw": (alike := ndtw(t)), "sdtw": alike * t.success}
@@ -365,6 +353,6 @@ def judged(trajectory: ContinuousTrajectory) -> dict[str, float]:
     return {**numbers, "collisions": t.collisions / steps if steps else 0.0}  # of the steps ahead, those that touched
 
 
-def expert_path(episode: ContinuousEpisode) -> np.ndarray:
+def expert_path(episode: continuous.ContinuousEpisode) -> np.ndarray:
     """(m, 3) metres that nDTW compares with; (0, 3) without."""
     return np.array(episode.expert or episode.reference, float).reshape(-1, 3)

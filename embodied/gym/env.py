@@ -27,18 +27,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageOps
 
 from embodied.envs.base import STEP_COST, ActionError, HelpEnv
+from embodied.gym import sensors
 from embodied.gym.playground import Playground, PlaygroundSettings, flat_playground, seen_features, split_playground
-from embodied.gym.sensors import (
-    PIXELS,
-    CameraSensor,
-    FeatureSensor,
-    PanoramaStore,
-    Sensor,
-    SensorSuite,
-    ViewSettings,
-    checked_observations,
-    encoder_entry,
-)
 from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
 from embodied.house.floor_plan import font, paint_plan
 from embodied.house.house import House
@@ -120,7 +110,7 @@ class HelpGymEnv(LiveEnv):
         self,
         make_env: Callable[[], HelpEnv],
         tasks: Sequence[Task],
-        sensor: Sensor,
+        sensor: sensors.Sensor,
         *,
         layout: SpaceLayout = LAYOUT,
         shaping: bool = False,
@@ -355,7 +345,7 @@ class EnvironmentSettings(PlaygroundSettings):
     seed: int = 0
     observations: str | Sequence[str] = ("rgb", "features")
     """Some of embodied.gym.sensors.OBSERVATIONS: 'rgb', 'depth', 'ids', 'features', 'oracle'."""
-    view: ViewSettings = ViewSettings()
+    view: sensors.ViewSettings = sensors.ViewSettings()
     """How pixels are framed."""
     source: FeatureSource | None = None
     """The features; those of the installed default encoder where not given."""
@@ -371,7 +361,7 @@ def open_resources(kind: str, **settings: Any) -> dict[str, Any]:
     """
     wanted = EnvironmentSettings(**settings)
     checked_seed(wanted.seed)
-    checked_observations(wanted.observations)
+    sensors.checked_observations(wanted.observations)
     data = wanted.data and Path(wanted.data)
     play = split_playground(kind, data, wanted.split, wanted) if data else flat_playground(kind, wanted.seed, wanted)
     layout = wanted.layout or SpaceLayout.of(kind_named(kind), wanted.rules)
@@ -380,29 +370,29 @@ def open_resources(kind: str, **settings: Any) -> dict[str, Any]:
     return {"make_env": play.make_env, "tasks": play.tasks, **how}
 
 
-def _sensor_of(play: Playground, wanted: EnvironmentSettings) -> Sensor:
+def _sensor_of(play: Playground, wanted: EnvironmentSettings) -> sensors.Sensor:
     """Everything that is seen, over one store of decoded panoramas.
 
     Raises:
       ValueError: pixels are asked of places that nobody can draw.
     """
-    sensors: list[Sensor] = []
+    parts: list[sensors.Sensor] = []
     seen = wanted.seen
     drawn = {name: w for name, w in play.worlds.items() if isinstance(w, World)}
-    store, pixels = PanoramaStore(drawn), [name for name in PIXELS if name in seen]
+    store, pixels = sensors.PanoramaStore(drawn), [name for name in sensors.PIXELS if name in seen]
     blind = sorted(set(play.worlds) - set(drawn))
     if blind and (pixels or ("features" in seen and wanted.source is None)):
         raise ValueError(
             f"there are no pictures of {blind[:3]}: only an embodied.World can be seen; choose observations='oracle'"
         )
     if pixels:
-        sensors.append(CameraSensor(store, pixels, wanted.view))
+        parts.append(sensors.CameraSensor(store, pixels, wanted.view))
     if "features" in seen:
-        source = wanted.source if wanted.source is not None else encoder_entry().load()(store)
-        sensors.append(FeatureSensor("features", source))
+        source = wanted.source if wanted.source is not None else sensors.encoder_entry().load()(store)
+        parts.append(sensors.FeatureSensor("features", source))
     if "oracle" in seen:
-        sensors.append(FeatureSensor("oracle", OracleFeatures(play.features, drawn)))
-    return SensorSuite(sensors)
+        parts.append(sensors.FeatureSensor("oracle", OracleFeatures(play.features, drawn)))
+    return sensors.SensorSuite(parts)
 
 
 class OracleFeatures:

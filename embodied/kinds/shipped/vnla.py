@@ -6,25 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from embodied import interface
 from embodied.action_spaces import WORDS
 from embodied.envs.base import HelpEnv, required
-from embodied.interface import (
-    Action,
-    Ask,
-    Episode,
-    FindObject,
-    Intention,
-    Language,
-    Mode,
-    Move,
-    Observation,
-    Place,
-    Reply,
-    Situation,
-    Stop,
-    Subtask,
-    Task,
-)
 from embodied.kinds import task_kind
 from embodied.kinds.shipped.hanna import TABLE_4_2
 from embodied.language.plain_language import PlainLanguage
@@ -44,19 +28,21 @@ class Advisor:
     not make it the teacher: it never labels, it only answers.
     """
 
-    def __init__(self, teacher: VnlaTeacher, language: Language, steps: int = HELP_STEPS) -> None:
+    def __init__(self, teacher: VnlaTeacher, language: interface.Language, steps: int = HELP_STEPS) -> None:
         self._teacher, self._language, self._steps = teacher, language, steps
 
-    def intentions(self, situation: Situation) -> tuple[Intention, ...]:
+    def intentions(self, situation: interface.Situation) -> tuple[interface.Intention, ...]:
         """Help, everywhere; the environment takes it away when the budget is spent."""
-        return (Intention.HELP,)
+        return (interface.Intention.HELP,)
 
-    def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
+    def answer(
+        self, situation: interface.Situation, question: interface.Intention, *, rng: np.random.Generator
+    ) -> interface.Reply:
         s = situation
         words, end = self._teacher.plan(s.world).words(s.pose, s.task.goal_nodes, self._steps)
         path = s.world.graph.path(s.pose.node, end.node)
-        subtask = Subtask("subgoal", end.node, start=s.pose, path=path, words=words)
-        return Reply(text=self._language.subgoal(words), subtask=subtask)
+        subtask = interface.Subtask("subgoal", end.node, start=s.pose, path=path, words=words)
+        return interface.Reply(text=self._language.subgoal(words), subtask=subtask)
 
 
 class VnlaEnv(HelpEnv):
@@ -71,10 +57,10 @@ class VnlaEnv(HelpEnv):
     def _begin(self) -> None:
         self._answered_at = -1
 
-    def _askable(self, situation: Situation) -> tuple[Intention, ...]:
+    def _askable(self, situation: interface.Situation) -> tuple[interface.Intention, ...]:
         return () if self._answered_at == self.time else super()._askable(situation)
 
-    def _replied(self, reply: Reply) -> None:
+    def _replied(self, reply: interface.Reply) -> None:
         self._answered_at = self.time
         self.instruction = f"{reply.text} . {self.task.request}"
         self.subtask = reply.subtask
@@ -88,23 +74,25 @@ class DirectVnlaEnv(VnlaEnv):
         super()._begin()
         self._orders: tuple[str, ...] = ()
 
-    def _replied(self, reply: Reply) -> None:
+    def _replied(self, reply: interface.Reply) -> None:
         super()._replied(reply)
         self._orders = required(reply.subtask, "sub-task in the reply").words
 
-    def step(self, action: Action) -> Observation | None:
+    def step(self, action: interface.Action) -> interface.Observation | None:
         """Like HelpEnv.step, but a move or stop is replaced while orders are pending; the Step says by what."""
         self._check(action)
-        if self._orders and not isinstance(action, Ask):
+        if self._orders and not isinstance(action, interface.Ask):
             word, self._orders = self._orders[0], self._orders[1:]
-            action = Stop(action.thought) if word == "stop" else Move(WORDS.index(word), action.thought)
+            action = (
+                interface.Stop(action.thought) if word == "stop" else interface.Move(WORDS.index(word), action.thought)
+            )
         return super().step(action)
 
 
 class MuteDirectVnlaEnv(DirectVnlaEnv):
     """Direct intervention that is not put into words: the agent reads its request throughout."""
 
-    def _replied(self, reply: Reply) -> None:
+    def _replied(self, reply: interface.Reply) -> None:
         time_on_task = self.time_on_task
         super()._replied(reply)
         self.instruction, self.time_on_task = self.task.request, time_on_task  # the instruction has not changed
@@ -118,17 +106,17 @@ class Algorithm6Env(HelpEnv):
     on the spot: its node alone does not say that anything was done.
     """
 
-    def _replied(self, reply: Reply) -> None:
-        self.mode, self.subtask = Mode.SUB, required(reply.subtask, "sub-task in the reply")
+    def _replied(self, reply: interface.Reply) -> None:
+        self.mode, self.subtask = interface.Mode.SUB, required(reply.subtask, "sub-task in the reply")
         self.instruction = required(reply.text, "text in the reply")  # lines 6-8
         self.targets = (self.subtask.target,)
         self.time_on_task = 0
 
     def _stopped(self) -> None:
-        if self.mode is Mode.MAIN:  # lines 15-16
+        if self.mode is interface.Mode.MAIN:  # lines 15-16
             self.ended = "stop"
             return
-        self.mode, self.instruction, self.subtask = Mode.MAIN, self.task.request, None  # line 13
+        self.mode, self.instruction, self.subtask = interface.Mode.MAIN, self.task.request, None  # line 13
         self.targets = self.task.goal_nodes
         self.time_on_task = 0
 
@@ -148,7 +136,7 @@ def check_rules(rules: str) -> None:
         raise ValueError(f"unknown rules {rules!r} of VNLA; use one of {sorted(RULES_OF_PLAY)}")
 
 
-def fitted(task: Task, world: Place, rules: str) -> Task:
+def fitted(task: interface.Task, world: interface.Place, rules: str) -> interface.Task:
     """The task with time enough under a rule of play: Algorithm 6 takes a step for every request and one to come back
     from every sub-task (docs/sources.md, S111)."""
     check_rules(rules)
@@ -180,25 +168,25 @@ def environments(inputs: task_kind.EnvInputs) -> task_kind.EnvMaker:
 Limits = Mapping[tuple[str, str], int]
 
 
-def learned_limits(training: Sequence[Task], place: Callable[[str], Place]) -> Limits:
+def learned_limits(training: Sequence[interface.Task], place: Callable[[str], interface.Place]) -> Limits:
     """Time limits by `limit_key`, from the lengths of training tasks."""
     lengths = [
         (*limit_key(place(t.world), t.start.node, t.goal), t.horizon)
         for t in training
-        if isinstance(t.goal, FindObject)  # as all of VNLA's are
+        if isinstance(t.goal, interface.FindObject)  # as all of VNLA's are
     ]
     return time_limits(lengths, MOST_ACTIONS)
 
 
-def limited(task: Task, world: Place, limits: Limits) -> Task:
+def limited(task: interface.Task, world: interface.Place, limits: Limits) -> interface.Task:
     """A task with the time limit of its rooms, and the budget that goes with it."""
-    assert isinstance(task.goal, FindObject), "VNLA tasks look for objects"
+    assert isinstance(task.goal, interface.FindObject), "VNLA tasks look for objects"
     key = limit_key(world, task.start.node, task.goal)
     horizon = max(task.horizon, limits.get(key, MOST_ACTIONS))
     return dataclasses.replace(task, horizon=horizon, budget=help_budget(horizon))
 
 
-def room_success(episode: Episode, graph: NavGraph) -> float:
+def room_success(episode: interface.Episode, graph: NavGraph) -> float:
     """1 if the agent ended in a room that holds a goal (docs/sources.md, S5)."""
     rooms = graph.room_of_node
     return float(rooms[episode.nodes[-1]] in {rooms[g] for g in episode.task.goal_nodes})
