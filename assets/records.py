@@ -12,30 +12,10 @@ Size = tuple[float, float, float]
 """Width, depth and height, metres."""
 
 ROOM_KINDS = (
-    "living_room",
-    "kitchen",
-    "dining_room",
-    "main_bedroom",
-    "bedroom",
-    "kids_room",
-    "guest_room",
-    "bathroom",
-    "toilet",
-    "hall",
-    "corridor",
-    "study",
-    "laundry_room",
-    "pantry",
-    "closet",
-    "library",
-    "playroom",
-    "gym",
-    "garage",
-    "family_room",
-    "sun_room",
-    "workshop",
-    "stairwell",
-)
+    "living_room", "kitchen", "dining_room", "main_bedroom", "bedroom", "kids_room", "guest_room", "bathroom",
+    "toilet", "hall", "corridor", "study", "laundry_room", "pantry", "closet", "library", "playroom", "gym",
+    "garage", "family_room", "sun_room", "workshop", "stairwell",
+)  # fmt: skip
 """Every room kind a house may hold; catalogue weights and generators use these keys only."""
 
 SUPPORTS = ("floor", "against_wall", "corner", "surface", "wall", "ceiling")
