@@ -21,7 +21,7 @@ from embodied.datasets.build import DatasetConfig, build_dataset, units
 from embodied.datasets.store import Dataset
 from embodied.kinds.plugins import shipped_kinds
 from embodied.kinds.task_kind import kind_named
-from embodied.mattersim.conventions import in_matterport_order
+from embodied.mattersim.pictures import in_matterport_order
 from embodied.navigation.graph import build_graph
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas

@@ -18,9 +18,8 @@ from test_scene import Unpainted
 from embodied.assets.cache import default_cache
 from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.generate import HouseConfig, generate_house
-from embodied.house.contents import contents, part_of
+from embodied.house.contents import contents, gives_way, part_of
 from embodied.house.house import HINGED, House
-from embodied.house.left_open import gives_way
 from embodied.scene.doors import openness
 from embodied.scene.model import build_spec, takeable
 
@@ -46,7 +45,7 @@ class Sweeps:
 
 
 def sweeps(house: House, catalogue: Catalogue) -> Sweeps:
-    """Blinds are up and what gives way is out of the way (embodied.house.left_open), of windows and furniture also
+    """Blinds are up and what gives way is out of the way (embodied.house.contents), of windows and furniture also
     doors."""
     away = {p.id for p in house.placements if gives_way(p, catalogue)}
     free = takeable(house, catalogue)

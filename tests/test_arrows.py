@@ -26,7 +26,6 @@ HOMES = {
             "scene/",
             "render/",
             "envs/driven.py",
-            "envs/robots.py",
             "gym/bring.py",
             "gym/robot.py",
             "light/",

@@ -20,8 +20,7 @@ from hand_data import built, read_features
 
 from embodied import mattersim
 from embodied.datasets.folders import PROGRAMS, action_space, export_folder, names_of, split_sentence, word_pieces
-from embodied.mattersim.conventions import in_matterport_order, scan_name
-from embodied.mattersim.pictures import write_skybox
+from embodied.mattersim.pictures import in_matterport_order, scan_name, write_skybox
 from embodied.render.panorama import Panorama
 
 pytestmark = pytest.mark.slow

@@ -15,9 +15,8 @@ from embodied.assets.materials import MATERIALS
 from embodied.assets.records import ROOM_KINDS
 from embodied.generate import STAGES, HouseConfig, generate_house, stages
 from embodied.generate.config import RETRIES
-from embodied.generate.kinds import BEDROOMS, ROOM_TABLE, Extra
 from embodied.generate.novelty import STYLE_FINISHES
-from embodied.generate.program import FURTHER
+from embodied.generate.program import BEDROOMS, FURTHER, ROOM_TABLE, Extra
 from embodied.generate.stages import Draft
 from embodied.generate.walkways import remove_blocking_objects
 from embodied.house.house import DOORS, House, HouseError, Placement, Room, check

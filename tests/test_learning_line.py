@@ -16,8 +16,7 @@ from hand_data import COMPACT, built, noise_features, random_encoder, small_hous
 from embodied import options
 from embodied.agents.common.settings import SHIPPED_AGENT, WEIGHTS
 from embodied.agents.common.weights import origin_of, weights_digest
-from embodied.agents.hanna.agent import HannaAbout, HannaAgent, HannaLearner, hanna_policies
-from embodied.agents.hanna.study import HannaStudy
+from embodied.agents.hanna.agent import HannaAbout, HannaAgent, HannaLearner, HannaStudy, hanna_policies
 from embodied.agents.hanna.topological_map import PerfectInterpretation
 from embodied.agents.learners.hanna import HannaTraining
 from embodied.agents.studies.engine import run_study

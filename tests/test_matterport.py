@@ -9,7 +9,7 @@ from hand_worlds import line_world
 
 from embodied.geometry import heading_of_yaw
 from embodied.interface import Pose
-from embodied.mattersim.conventions import action_list, in_matterport_order, tokenised, view_index, write_features
+from embodied.mattersim.pictures import action_list, in_matterport_order, tokenised, view_index, write_features
 
 
 def test_views_agree_about_where_they_look():

@@ -20,9 +20,8 @@ from embodied.assets.moving_parts import OPENING_CLASSES, opened, taken_apart
 from embodied.assets.records import bounds
 from embodied.evaluation.evaluate import play
 from embodied.generate import HouseConfig, generate_house
-from embodied.house.contents import contents, part_of
+from embodied.house.contents import contents, free_openness, left_open, part_of
 from embodied.house.house import House, HouseError, Placement
-from embodied.house.left_open import free_openness, left_open
 from embodied.house.moment import Moment, apart
 from embodied.house.shapes import inward
 from embodied.house.validation import check_known

@@ -25,10 +25,10 @@ from embodied.generate.people import (
     POLITE,
     add_people,
     place_people,
+    rearranged,
     sits,
     stands,
 )
-from embodied.generate.rearrange import rearranged
 from embodied.geometry import facing_of, wrap
 from embodied.house.house import House, Opening, Placement, check
 from embodied.house.household import household_of, residents

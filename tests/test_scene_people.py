@@ -9,7 +9,7 @@ import pytest
 from embodied.assets.people import people, posed
 from embodied.house.moment import Moment, MovingPerson
 from embodied.people.gait import Limbs, sitting, solved, walk
-from embodied.scene.people import AWAY, add_person, stand_people
+from embodied.scene.bodies import AWAY, add_person, stand_people
 
 BALL = """<mujoco><option timestep="0.005"/><worldbody><geom name="floor" type="plane" size="9 9 1"/>
 <body name="ball" pos="1 0 .15"><freejoint/><geom size=".15" mass="1"/></body></worldbody></mujoco>"""

@@ -18,9 +18,8 @@ from embodied.assistants.descriptions import Describer, described
 from embodied.datasets.scene_graph import write_semantic_maps
 from embodied.envs.continuous import ContinuousEnv, ContinuousEpisode, NavigationGoal, ShortestPathFollower
 from embodied.generate import STAGES, HouseConfig, generate_house
-from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.plan_file import house_of_plan, load_plan
-from embodied.generate.program import draw_storeys_of
+from embodied.generate.program import ROOM_TABLE, draw_storeys_of
 from embodied.generate.stairwell import fitting
 from embodied.house.floor_plan import paint_plan
 from embodied.house.house import House, HouseError

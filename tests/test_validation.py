@@ -17,7 +17,7 @@ from embodied.house.floor_plan import ROOM_COLOURS
 from embodied.house.house import House, HouseError, Placement
 from embodied.house.validation import check_known, load_house
 from embodied.language.lexicon import ROOM_NOUNS
-from embodied.mattersim.conventions import REGIONS
+from embodied.mattersim.pictures import REGIONS
 
 
 @functools.cache
@@ -108,7 +108,7 @@ TABLES_OF_ROOM_KINDS = {
     "generate/furnish/rooms.toml": tables().rooms,
     "language/words.toml": ROOM_NOUNS,
     "house/floor_plan.toml": ROOM_COLOURS,
-    "mattersim/conventions.py": REGIONS,
+    "mattersim/pictures.py": REGIONS,
 }
 
 

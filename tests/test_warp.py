@@ -18,9 +18,9 @@ from embodied.house.moment import Moment, MovingPerson
 from embodied.people.gait import Limbs, solved, walk
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
+from embodied.scene.bodies import add_person, stand_people
 from embodied.scene.house_meshes import owners
 from embodied.scene.model import build_spec
-from embodied.scene.people import add_person, stand_people
 
 EYE = (2.5, 2.6, 1.2)
 SIZE = 64

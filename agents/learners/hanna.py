@@ -192,7 +192,7 @@ register_learner(
     Learner(
         name="hanna",
         train=(HannaTraining, options.training("embodied.agents.hanna.agent:HannaLearner.train", "hanna")),
-        study=(HannaStudyOptions, options.study_by("embodied.agents.hanna.study:HannaStudy")),
+        study=(HannaStudyOptions, options.study_by("embodied.agents.hanna.agent:HannaStudy")),
         players=players,
         columns=(
             *("success", "strict success", "spl", "navigation error", "requests"),

@@ -29,7 +29,7 @@ from embodied.assets.closure import code_digest
 from embodied.assets.json_file import read_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
-from embodied.generate.rearrange import rearranged
+from embodied.generate.people import rearranged
 from embodied.house.house import House
 from embodied.interface import Route
 from embodied.light import lightings_of
@@ -114,7 +114,7 @@ class StripSource:
 
 
 LATER_DAY, LATER_LIGHTING = 1, 1
-"""Of pictures taken later: the day of embodied.generate.rearrange, and the number in embodied.light.lightings_of."""
+"""Of pictures taken later: the day of embodied.generate.people, and the number in embodied.light.lightings_of."""
 FEATURE_ENDINGS = {SAME_TIME: "", LATER_CAMERA: f"+light{LATER_LIGHTING}+day{LATER_DAY}+robot"}
 """Of the names of files with features, after the house."""
 CAMERAS_OF = {SAME_TIME: PhotoCamera(), LATER_CAMERA: PhotoCamera("robot", seed=LATER_DAY)}

@@ -3,7 +3,7 @@
 
 A folder has the shape of the program's repository, so that it is laid over a copy of it; its README.md says which
 program and version, what goes where, and which lines of the program a current PyTorch needs changed. The files' fields
-are those of embodied.mattersim.conventions. Where a program wants something of the data that ours need not have, the
+are those of embodied.mattersim.pictures. Where a program wants something of the data that ours need not have, the
 writer says at the line how it is met.
 """
 
@@ -26,7 +26,7 @@ import numpy as np
 from embodied.assets.cache import write_bytes
 from embodied.errors import UnableError
 from embodied.interface import TURNS, FindObject, FollowRoute, Pose, Route, Task
-from embodied.mattersim.conventions import (
+from embodied.mattersim.pictures import (
     CAMERA,
     REGIONS,
     action_list,

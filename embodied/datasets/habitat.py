@@ -34,7 +34,7 @@ from embodied.envs.continuous import (
     seen_from,
 )
 from embodied.interface import FindInTurn, FollowRoute, Place, Task
-from embodied.mattersim.conventions import tokenised
+from embodied.mattersim.pictures import tokenised
 from embodied.navigation.free_space import EYE
 from embodied.seeds import stream
 from embodied.tasks.goals import GOAT_REACH, find_instances

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from embodied.generate.footprint import Rect, shared_area
-from embodied.generate.kinds import NEIGHBOUR_VALUES, ROOM_TABLE
 from embodied.generate.modules import Cell
+from embodied.generate.program import NEIGHBOUR_VALUES, ROOM_TABLE
 
 MOVING = {"hall", "corridor", "stairwell"}
 """Kinds of room that are there to be walked through."""

@@ -11,8 +11,8 @@ import numpy as np
 import shapely
 
 from embodied.generate.access import MOVING
-from embodied.generate.kinds import BEDROOMS
 from embodied.generate.novelty import FINISH_TABLE, finishes_of, styles_of
+from embodied.generate.program import BEDROOMS
 from embodied.house.house import House, Room
 
 WET = ("bathroom", "toilet", "laundry_room")

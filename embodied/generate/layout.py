@@ -11,9 +11,8 @@ import numpy as np
 
 from embodied.generate.access import Link, connect, has_outer_doors, score, walls_between, ways_between, worth_above
 from embodied.generate.footprint import Band, Cap, Footprint, Rect, Strip, shared_area
-from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.modules import THROUGH, Cell, Module, Slot, arrange, draw_modules, width
-from embodied.generate.program import WantedRoom
+from embodied.generate.program import ROOM_TABLE, WantedRoom
 from embodied.generate.stairwell import stairwell
 
 LONG = 95

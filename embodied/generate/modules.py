@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.generate.footprint import Rect, Strip
-from embodied.generate.kinds import BEDROOMS, ROOM_TABLE
-from embodied.generate.program import WantedRoom
+from embodied.generate.program import BEDROOMS, ROOM_TABLE, WantedRoom
 
 FILLERS = {"kitchen": "pantry", **dict.fromkeys((*BEDROOMS, "hall", "study", "laundry_room"), "closet")}
 """Kind of room that a leftover niche beside such a room becomes."""

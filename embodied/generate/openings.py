@@ -9,9 +9,9 @@ import numpy as np
 import shapely
 
 from embodied.generate.access import MOVING, Link, Pair, SharedWall, beside_floor, outer_stretches, walls_between
-from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.layout import FloorPlan
 from embodied.generate.modules import Cell
+from embodied.generate.program import ROOM_TABLE
 from embodied.geometry import rotation
 from embodied.house.house import Opening, rounded
 

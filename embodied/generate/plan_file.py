@@ -24,9 +24,9 @@ from embodied.assets.json_file import RecordError, load_json
 from embodied.generate.access import connect, has_outer_doors, walls_between
 from embodied.generate.config import HouseConfig
 from embodied.generate.footprint import Rect, shared_area
-from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.layout import FloorPlan
 from embodied.generate.modules import Cell
+from embodied.generate.program import ROOM_TABLE
 from embodied.generate.special import under_roof
 from embodied.generate.stages import DEFAULT, STAGES, generate_house, with_plan
 from embodied.generate.stairwell import stairwells

@@ -7,9 +7,9 @@ import shapely
 
 from embodied.generate.access import MOVING, WET, SharedWall, beside_slopes, connect, outer_stretches, walls_between
 from embodied.generate.footprint import Rect, shared_area
-from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.layout import FloorPlan
 from embodied.generate.modules import Cell
+from embodied.generate.program import ROOM_TABLE
 
 CHANCES = {"L": 0.6, "bay": 0.4}
 """How often a house has each of them where its seed decides."""

@@ -18,12 +18,11 @@ from embodied.generate.finishes import Palette, assign_materials, draw_palette
 from embodied.generate.footprint import Footprint, draw_footprint, draw_shape
 from embodied.generate.furnish import furnish
 from embodied.generate.furnish.tables import tables, tables_of
-from embodied.generate.kinds import BEDROOMS
 from embodied.generate.layout import FloorPlan, draw_plan, turned, with_short_corridors
 from embodied.generate.modules import Cell
 from embodied.generate.novelty import furnishable
 from embodied.generate.openings import KNEE, Leaves, draw_openings
-from embodied.generate.program import WantedRoom, draw_area, draw_program, draw_storeys_of
+from embodied.generate.program import BEDROOMS, WantedRoom, draw_area, draw_program, draw_storeys_of
 from embodied.generate.special import with_special_rooms
 from embodied.generate.stairwell import SLAB, TALLEST, stair_of
 from embodied.generate.storeys import draw_storeys

@@ -7,10 +7,9 @@ import numpy as np
 
 from embodied.generate.access import WET, shared_wall
 from embodied.generate.footprint import Band, Footprint, draw_footprint, shared_area
-from embodied.generate.kinds import BEDROOMS, ROOM_TABLE
 from embodied.generate.layout import FloorPlan, draw_plan
 from embodied.generate.modules import Cell
-from embodied.generate.program import WantedRoom, scaled
+from embodied.generate.program import BEDROOMS, ROOM_TABLE, WantedRoom, scaled
 
 UPSTAIRS = (*BEDROOMS, "bathroom", "closet", "playroom", "study", "library", "gym")
 """Kinds of room that belong upstairs."""

@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 from gymnasium import spaces
 
-from embodied.envs.robots import FETCHER, RobotBody
+from embodied.envs.driven import FETCHER, RobotBody
 from embodied.gym.drive import chosen_worlds
 from embodied.gym.driving import POINTS, TEXT
 from embodied.gym.env import VIEW, LiveEnv

@@ -87,7 +87,7 @@ class Panorama:
 
         View k looks along yaw 30 (k % 12) degrees, counter-clockwise from +x, and along pitch
         30 (k // 12 - 1) degrees: 0-11 down, 12-23 level, 24-35 up, as `Candidates.view` and a
-        FeatureSource's rows count them. Matterport's own order is in embodied.mattersim.conventions.
+        FeatureSource's rows count them. Matterport's own order is in embodied.mattersim.pictures.
         """
         checked(VFOV36, (size, size))
         return self.through(grid36(self.size, size), "rgb").reshape(VIEWS, size, size, 3)

@@ -25,9 +25,8 @@ from embodied.datasets.vqa.types import CHANGE, TYPES
 from embodied.datasets.vqa.walks import TURN, Walk, cameras, film, look_around, tour, view_of
 from embodied.generate import HouseConfig
 from embodied.generate.people import CLASS, add_people, place_people
-from embodied.house.contents import stocked
+from embodied.house.contents import free_openness, left_open, stocked
 from embodied.house.house import House, Placement
-from embodied.house.left_open import free_openness, left_open
 from embodied.house.moment import Moment, RigidPose, Triple
 from embodied.locks import locked
 from embodied.navigation.connectivity import from_matterport, to_matterport
