@@ -93,9 +93,8 @@ def digest(*parts: object) -> str:
 def atomic_path(path: Path, *, sync: bool = True) -> Iterator[Path]:
     """A path of the same name in a private folder beside `path`, which becomes `path` only if the body succeeds.
 
-    A reader therefore sees the old file, no file or the whole new file; Ctrl-C, a full disk or
-    an exception leaves nothing half-written behind. What a killed process left in the folder is
-    removed on the way.
+    A reader therefore sees the old file, no file or the whole new file; Ctrl-C, a full disk or an exception leaves
+    nothing half-written behind. What a killed process left in the folder is removed on the way.
 
     Args:
       sync: False does not wait for the disk; for the many small files that are checked when read.

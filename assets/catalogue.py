@@ -1,9 +1,8 @@
 """The Catalogue: every asset a house may hold, read from reviewed JSON without touching a mesh.
 
-`data/classes.json` says once per object class what its models share (how they are supported,
-the rooms they belong in, synonyms, what they rest on); `data/catalogue.json` has one line per
-model and may override any of it; `data/built.json` has one line per thing that code builds.
-Meshes come from the packs, or the makers of built things, on first use.
+`data/classes.json` says once per object class what its models share (how they are supported, the rooms they belong in,
+synonyms, what they rest on); `data/catalogue.json` has one line per model and may override any of it; `data/built.json`
+has one line per thing that code builds. Meshes come from the packs, or the makers of built things, on first use.
 """
 
 from __future__ import annotations

@@ -25,8 +25,7 @@ def start() -> int:
 
 
 def stop(number: int, frame: FrameType | None) -> None:
-    """Handle Ctrl-C and SIGTERM: end the program if something is being imported, else raise
-    KeyboardInterrupt."""
+    """Handle Ctrl-C and SIGTERM: end the program if something is being imported, else raise KeyboardInterrupt."""
     import os
 
     while frame is not None:

@@ -808,10 +808,9 @@ Rngs = Sequence[np.random.Generator]
 class Policy(Protocol):
     """Acts for a batch of episodes at once.
 
-    Position i of every call belongs to the same episode; its observation is None once it has
-    ended, and so must its action be. The memory is the policy's own business: None on the first
-    call of a batch, then whatever it returned. It may draw only from rngs[i] for episode i, so
-    that an episode does not depend on the batch around it.
+    Position i of every call belongs to the same episode; its observation is None once it has ended, and so must its
+    action be. The memory is the policy's own business: None on the first call of a batch, then whatever it returned. It
+    may draw only from rngs[i] for episode i, so that an episode does not depend on the batch around it.
     """
 
     def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, Any]: ...

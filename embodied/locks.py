@@ -30,9 +30,8 @@ class LockedError(UnableError):
 def locked(folder: Path, *, wait: bool = False) -> Iterator[None]:
     """Hold `folder`, which is made if missing, for writing while the body runs.
 
-    The lock is the operating system's (flock), so it is gone when its process is, also after a
-    kill; what is written into the file is for people. What killed processes left unfinished in the
-    folder is removed.
+    The lock is the operating system's (flock), so it is gone when its process is, also after a kill; what is written
+    into the file is for people. What killed processes left unfinished in the folder is removed.
 
     Args:
       wait: until whoever holds it is done, instead of raising LockedError.

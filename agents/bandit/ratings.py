@@ -82,11 +82,10 @@ ORDERS = (1, 2, 3, 4)
 def sentence_bleu(words: Sequence[str], reference: Sequence[str]) -> float:
     """Add-one-smoothed BLEU of one sentence, in [0, 1]; 1 for the reference itself.
 
-    Numerators and denominators of all four orders and both lengths of the brevity penalty get one
-    more (3.1.4, footnote 3). The text's source, Chen and Cherry (2014), leaves unigrams as they
-    are; the authors' program smooths them as well, which is done here: a translation that shares no
-    word with its reference is still better short than long. Unlike in the program the end mark is
-    no word (docs/sources.md, S66).
+    Numerators and denominators of all four orders and both lengths of the brevity penalty get one more (3.1.4, footnote
+    3). The text's source, Chen and Cherry (2014), leaves unigrams as they are; the authors' program smooths them as
+    well, which is done here: a translation that shares no word with its reference is still better short than long.
+    Unlike in the program the end mark is no word (docs/sources.md, S66).
     """
     logs = 0.0
     for n in ORDERS:

@@ -4,8 +4,7 @@
     train_critic  the critic, on translations sampled from the frozen translator
     bandit        NED-A2C (Algorithm 2), or its two controls: learning nothing, learning from references
 
-Every draw is named by seed, pass and sentence, so a stage that was stopped goes on exactly as if it
-had not been.
+Every draw is named by seed, pass and sentence, so a stage that was stopped goes on exactly as if it had not been.
 """
 
 import dataclasses

@@ -104,10 +104,9 @@ def by_the_text(agent: HannaAgent, bank: FeatureBank) -> MapPolicy:
 def hanna_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = HannaAgent.policy) -> dict[str, Agent]:
     """Variants of a learned agent by the names of Tables 4.3 to 4.5, and two that show the worth of sight.
 
-    'no ask', 'random ask' and 'ask every 5' put another rule before the same networks; the
-    authors train an agent for each rule (`embodied train hanna --ask-rule ...`; docs/sources.md, S39).
-    'blind' sees black with network and matcher alike; 'rules only' draws moves evenly, stops by the picture alone and
-    asks every 5 steps.
+    'no ask', 'random ask' and 'ask every 5' put another rule before the same networks; the authors train an agent for
+    each rule (`embodied train hanna --ask-rule ...`; docs/sources.md, S39). 'blind' sees black with network and matcher
+    alike; 'rules only' draws moves evenly, stops by the picture alone and asks every 5 steps.
     """
     learned, every5 = of(agent, bank), RULES["every5"][1]
     ours = agent.policy(bank)
@@ -161,8 +160,7 @@ class Experience:
 def labelled(
     episodes: Sequence[Episode], moments: Sequence[StepScores], teacher: Teacher, worlds: Mapping[str, Place]
 ) -> Experience:
-    """Outputs of the networks in some episodes, beside the teacher's labels; A is the most actions of any
-    step."""
+    """Outputs of the networks in some episodes, beside the teacher's labels; A is the most actions of any step."""
     labels = [teacher.relabel(e, worlds[e.task.world]) for e in episodes]
     rows = [labels[position][t] for t, (positions, _) in enumerate(moments) for position in positions]
     scores = [s for _, s in moments]

@@ -1,9 +1,8 @@
 """The two networks of HANNA, dissertation appendix D.2: where to go, and when to ask.
 
-B agents, A navigation actions, h hidden size, D visual feature size, n steps so far plus one (a
-memory opens with zero vectors). Each line carries the number of the equation it computes. What
-differs from the text, and why, is said at the line; what dissertation and program do differently was
-decided so (docs/sources.md, by its numbers):
+B agents, A navigation actions, h hidden size, D visual feature size, n steps so far plus one (a memory opens with zero
+vectors). Each line carries the number of the equation it computes. What differs from the text, and why, is said at the
+line; what dissertation and program do differently was decided so (docs/sources.md, by its numbers):
   * an agent's inter-task memory is reset when *its own* task changes (text; the program resets the
     whole batch; S23), so results do not depend on the batch;
   * the navigation score is the bilinear form of D.18, with biases (S24);

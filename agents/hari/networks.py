@@ -50,11 +50,10 @@ def transformer(size: int, layers: int, heads: int, dropout: float) -> nn.Transf
 class ExecutionNetwork(nn.Module):
     """pi-hat: (b^s_{t-1}, d^s, d^g) -> b^s_t and a distribution over moves.
 
-    "We adapt the V&L BERT architecture": an encoder reads each description by itself, a decoder
-    attends from the previous hidden vector over both. What the text leaves open and is decided
-    here (docs/sources.md, S75): moves are scored by the product of b^s_t with the
-    embedding of the feature set that an assistant would use for them, so that "go north" and the
-    neighbour to the north are near each other from the start.
+    "We adapt the V&L BERT architecture": an encoder reads each description by itself, a decoder attends from the
+    previous hidden vector over both. What the text leaves open and is decided here (docs/sources.md, S75): moves are
+    scored by the product of b^s_t with the embedding of the feature set that an assistant would use for them, so that
+    "go north" and the neighbour to the north are near each other from the start.
     """
 
     def __init__(self, config: ExecutionConfig, names: int) -> None:

@@ -61,8 +61,7 @@ class Sizes(Checked):
 
 
 BANDIT_SCALES = scales(BanditConfig, "bandit")
-"""'mini': minutes on a core; 'paper': section 3.1.5.2, for a GPU and the
-dissertation's corpora."""
+"""'mini': minutes on a core; 'paper': section 3.1.5.2, for a GPU and the dissertation's corpora."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,11 +1,10 @@
 """Encoder: the network that turns a panorama into 36 x D features, with its file and its digest; and the strip that it
 looks at: the part of an equirect that the 36 views see, and where in it each view looks.
 
-The 36 views (12 turns of 30 degrees x 3 tilts, 60 degrees high, 75 wide) overlap about fourfold,
-so a network that looks at each alone does most of its work four times. Here it looks once at a
-strip of 360 x 120 degrees, 576 x 192 pixels, and every view is a window of the feature map. The
-map's cells are 10 degrees wide, three to a turn, so turning the agent by 30 degrees turns its
-features exactly.
+The 36 views (12 turns of 30 degrees x 3 tilts, 60 degrees high, 75 wide) overlap about fourfold, so a network that
+looks at each alone does most of its work four times. Here it looks once at a strip of 360 x 120 degrees, 576 x 192
+pixels, and every view is a window of the feature map. The map's cells are 10 degrees wide, three to a turn, so turning
+the agent by 30 degrees turns its features exactly.
 
 Row 0 looks 60 degrees up. Column 0 begins at yaw +pi and yaw falls to the right: what is on the
 left in the picture is on the left in the world.
@@ -55,9 +54,8 @@ def directions() -> np.ndarray:
 def view_coverage(view: int) -> np.ndarray:
     """(192, 576) float64: how much picture area of view `view` each pixel of the strip covers; 0 outside.
 
-    A pixel's solid angle is proportional to cos(pitch); a solid angle at angle theta from the
-    optical axis covers 1 / cos(theta)^3 of the picture plane. Averages with these weights equal
-    averages over the perspective picture.
+    A pixel's solid angle is proportional to cos(pitch); a solid angle at angle theta from the optical axis covers 1 /
+    cos(theta)^3 of the picture plane. Averages with these weights equal averages over the perspective picture.
     """
     yaw, pitch = VIEW_YAWS[view], VIEW_PITCHES[view]
     forward = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])

@@ -1,8 +1,7 @@
 """Small solid shapes with smooth normals and uv in metres, from which things are built in code.
 
-Every function is pure. Points are (n, 3) float64 in metres; faces run counter-clockwise seen from
-outside. Texture coordinates are metres along the surface, u along the grain; `part` divides them
-by the finish's tile.
+Every function is pure. Points are (n, 3) float64 in metres; faces run counter-clockwise seen from outside. Texture
+coordinates are metres along the surface, u along the grain; `part` divides them by the finish's tile.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Wavefront OBJ and MTL, read into index arrays per material.
 
-Why not trimesh's loader: it cuts polygons into fans, which fills the hollows of the concave ones
-that the packs are full of, and it keeps neither smoothing nor transparency apart. tinyobjloader has
-release candidates only.
+Why not trimesh's loader: it cuts polygons into fans, which fills the hollows of the concave ones that the packs are
+full of, and it keeps neither smoothing nor transparency apart. tinyobjloader has release candidates only.
 """
 
 import dataclasses

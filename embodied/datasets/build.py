@@ -277,8 +277,7 @@ def build_unit(
 ) -> str:
     """Build one house's folder unless it is there; returns its name.
 
-    It is made under another name and renamed when whole, so a kill leaves nothing half-built
-    that is later believed.
+    It is made under another name and renamed when whole, so a kill leaves nothing half-built that is later believed.
     """
     home = folder / "houses" / unit.name
     if (home / "unit.json").exists():

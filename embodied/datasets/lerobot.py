@@ -7,11 +7,10 @@
   data/chunk-000/file-000.parquet         one row per step
   videos/observation.images.view/chunk-000/file-000.mp4    one frame per step, many episodes after one another
 
-A frame is what the agent sees before it acts, cut from the panorama that the data set holds. The task of a step is
-the instruction that it hears then, so that an assistant's words appear where they were said; they are events of the
-frame, too (`language_events`). HARI's descriptions of places are put into words. Depth is a video of 12 bits, as
-LeRobot 0.6 quantises it. Written from the published description of the format (huggingface.co/docs/lerobot,
-LeRobotDataset v3.0).
+A frame is what the agent sees before it acts, cut from the panorama that the data set holds. The task of a step is the
+instruction that it hears then, so that an assistant's words appear where they were said; they are events of the frame,
+too (`language_events`). HARI's descriptions of places are put into words. Depth is a video of 12 bits, as LeRobot 0.6
+quantises it. Written from the published description of the format (huggingface.co/docs/lerobot, LeRobotDataset v3.0).
 """
 
 from __future__ import annotations

@@ -334,8 +334,7 @@ def social_measures(t: ContinuousTrajectory, steps: int) -> dict[str, float]:
 
 
 POSITION = ("ahead", "left", "sin", "cos", "tilt")
-"""Odometry: metres from the start in its frame, the turn since then, radians of the
-camera's tilt."""
+"""Odometry: metres from the start in its frame, the turn since then, radians of the camera's tilt."""
 
 
 def odometry(episode: ContinuousEpisode, position: np.ndarray, yaw: float, pitch: float) -> np.ndarray:

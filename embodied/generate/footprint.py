@@ -1,8 +1,7 @@
 """The footprint: one to four wings along a corridor spine, on a grid of 0.1 m.
 
-A house is drawn in a canonical pose, the first wing running along +x from the public end and the
-others hanging down from it; `generate.layout` mirrors and turns the finished plan. Lengths here
-are integers in decimetres.
+A house is drawn in a canonical pose, the first wing running along +x from the public end and the others hanging down
+from it; `generate.layout` mirrors and turns the finished plan. Lengths here are integers in decimetres.
 """
 
 from __future__ import annotations

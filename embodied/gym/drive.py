@@ -30,10 +30,9 @@ from embodied.world import World, open_world
 class DriveEnv(LiveEnv):
     """Driving as a Gymnasium environment.
 
-    Reward: 1 on success, minus 0.01 a command and 0.05 for every collision, plus a tenth for every
-    metre nearer to the goal along the floor. An episode ends when the point is reached, when the object is said to be
-    here, and is cut short after `seconds`. info: success, is_success, spl, collisions, metres, seconds,
-    distance_to_goal (metres).
+    Reward: 1 on success, minus 0.01 a command and 0.05 for every collision, plus a tenth for every metre nearer to the
+    goal along the floor. An episode ends when the point is reached, when the object is said to be here, and is cut
+    short after `seconds`. info: success, is_success, spl, collisions, metres, seconds, distance_to_goal (metres).
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}

@@ -96,9 +96,8 @@ class HelpGymEnv(LiveEnv):
     Stable-Baselines3) and spl, as if the episode were cut short there: that is what Gymnasium's TimeLimit does. The
     last info of an episode that ends by itself has the other metrics of every task, too.
 
-    An action that the mask forbids leaves everything as it was and is reported in
-    info["invalid_action"]; after `patience` of them the episode is truncated. With `strict` it
-    raises ActionError instead.
+    An action that the mask forbids leaves everything as it was and is reported in info["invalid_action"]; after
+    `patience` of them the episode is truncated. With `strict` it raises ActionError instead.
 
     Every info has the words of the moment: "request" (the task), "instruction" (the request, or what the
     assistant said last) and "candidates", one {"action", "heading", "text"} for each possible move.

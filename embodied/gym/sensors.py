@@ -1,8 +1,7 @@
 """Sensors: what an environment shows of a place, beside words, moves and clock.
 
-Pixels (`CameraSensor`) are resampled from the panoramas of the viewpoints, which are drawn once and
-kept; features (`FeatureSensor`) are an encoder's of the same panoramas, or an oracle's list of the
-visible objects.
+Pixels (`CameraSensor`) are resampled from the panoramas of the viewpoints, which are drawn once and kept; features
+(`FeatureSensor`) are an encoder's of the same panoramas, or an oracle's list of the visible objects.
 """
 
 from __future__ import annotations

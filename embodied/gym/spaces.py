@@ -126,8 +126,7 @@ def encode(o: Observation, sensor: Sensor, layout: SpaceLayout) -> dict[str, Any
 def codes_of(text: str, length: int) -> np.ndarray:
     """(length,) uint8, not to be written to: the text as ASCII codes, cut or padded with zeros.
 
-    Not a gymnasium Text space, because AsyncVectorEnv (Gymnasium 1.4) does not refresh texts that
-    lie in shared memory.
+    Not a gymnasium Text space, because AsyncVectorEnv (Gymnasium 1.4) does not refresh texts that lie in shared memory.
     """
     codes = np.frombuffer(text.encode("ascii", "replace")[:length], dtype=np.uint8)
     padded = np.concatenate([codes, np.zeros(length - len(codes), dtype=np.uint8)])

@@ -3,8 +3,7 @@
     envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=64, data="DIR")
 
 Play itself is Python and takes its turn; what is seen is resampled by threads that share the decoded panoramas and
-write straight into the batch. For several processes, use Gymnasium's AsyncVectorEnv
-(vectorization_mode="async").
+write straight into the batch. For several processes, use Gymnasium's AsyncVectorEnv (vectorization_mode="async").
 """
 
 from __future__ import annotations

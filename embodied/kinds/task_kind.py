@@ -1,9 +1,8 @@
 """Kinds of tasks: a record each, registered where it is defined. The rest of the program knows no kind by name.
 
 A kind is one file: `embodied/kinds/shipped/hanna.py`, or a module of your own that calls `register_kind`
-(examples/my_task.py).
-Wherever a kind is named, in commands, in data sets and for Gymnasium, a kind of your own is 'module:NAME': the name of
-an importable module, which may lie in the current folder, and of the `TaskKind` in it.
+(examples/my_task.py). Wherever a kind is named, in commands, in data sets and for Gymnasium, a kind of your own is
+'module:NAME': the name of an importable module, which may lie in the current folder, and of the `TaskKind` in it.
 
     KIND = register_kind(TaskKind(name="my_task:KIND", title="MyTask", tasks=tasks))
 

@@ -22,9 +22,8 @@ from embodied.seeds import FAMILIAR
 @dataclass(frozen=True)
 class Template:
     kinds: tuple[str, ...]
-    """Clause kinds in order: 'turn', 'slight', 'around', 'exit', 'enter', 'door', 'open_door',
-    'open_door_side', 'cross', 'forward', 'metres', 'to',
-    'past', 'past_side', 'avoid', 'notice', 'stop_by', 'stop_in', 'stop_here'."""
+    """Clause kinds in order: 'turn', 'slight', 'around', 'exit', 'enter', 'door', 'open_door', 'open_door_side',
+    'cross', 'forward', 'metres', 'to', 'past', 'past_side', 'avoid', 'notice', 'stop_by', 'stop_in', 'stop_here'."""
     text: str
     habit: str = ""
     """'terse', 'chatty', 'formal', or '' for everybody."""

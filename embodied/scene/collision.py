@@ -187,10 +187,9 @@ def grid_boxes(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """(low, high) corners of boxes that cover `points` (k, 3), from a grid of cubes, n along the longest side.
 
-    The grid is cut at the heights `cut` too; cavities without a way out are filled. Every box is
-    shrunk to the points in it, so a table top stays thin and its height exact; what nearly reaches
-    the bounds of the whole reaches them, so that a thing stands on all its feet. Stops as soon as
-    there are more than `most` boxes.
+    The grid is cut at the heights `cut` too; cavities without a way out are filled. Every box is shrunk to the points
+    in it, so a table top stays thin and its height exact; what nearly reaches the bounds of the whole reaches them, so
+    that a thing stands on all its feet. Stops as soon as there are more than `most` boxes.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     counts = np.maximum(1, np.rint((high - low) / ((high - low).max() / n + 1e-12))).astype(int)

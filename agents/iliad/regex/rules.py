@@ -1,9 +1,8 @@
 """Rules 'pattern@replacement': their shapes, how one is carried out on a word, whoever wrote it (C.1.2), and the
 networks that read and write them.
 
-A rule of our own is three groups, of which the outer ones hold an anchor or nothing:
-'(^)(Ca)()@x\\2' puts an x before a consonant and an a at the start of a word. C and V stand for any
-consonant and any vowel.
+A rule of our own is three groups, of which the outer ones hold an anchor or nothing: '(^)(Ca)()@x\\2' puts an x before
+a consonant and an a at the start of a word. C and V stand for any consonant and any vowel.
 
 The networks of REGEX (Figure C.5): a speller reads a word and a request and writes; a describer reads changes. Letters,
 characters of rules and words of requests are numbers to them. B data points, W letters of a word, S words of a request,

@@ -1,8 +1,7 @@
 """The space of one room: boxes that may not meet, walls to stand at, and the floor one walks on.
 
-Everything that stands, hangs or must stay free in a room is an upright box. A plan of the floor
-in cells of 5 cm, eroded by the radius of a walker, tells whether doors and furniture stay
-reachable when a box is added.
+Everything that stands, hangs or must stay free in a room is an upright box. A plan of the floor in cells of 5 cm,
+eroded by the radius of a walker, tells whether doors and furniture stay reachable when a box is added.
 """
 
 from __future__ import annotations
@@ -235,8 +234,7 @@ class RoomSpace:
     def walkable(self, added: Iterable[Box], reach: Iterable[tuple[float, float]]) -> np.ndarray | None:
         """The walking plan with `added` boxes in it, or None if it would cut the room apart.
 
-        Every entry and every point of `reach` must lie in one connected part that holds nearly
-        all of the free floor.
+        Every entry and every point of `reach` must lie in one connected part that holds nearly all of the free floor.
         """
         plan = self.walk.copy()
         for b in added:

@@ -13,10 +13,9 @@ from embodied.policies.listeners import ScriptedListener
 WORDING_OF = {"main": ("train_seen", "val", "test"), "val": ("train_unseen",), "test": ("train_unseen",)}
 """Splits of the wordings whose routes are the tasks of a part."""
 ROOM_TO_ROOM = Splits({"train": 61, "val": 11, "test": 18}, five_splits(14_025, 1_020, 2_349, 1_020, 4_173))
-"""The dissertation does not tabulate VLN: Anderson et al. 2018, section 4.4 (61 scenes with 14,025
-training and 1,020 seen validation instructions, 11 scenes with 2,349, 18 scenes with 4,173; the files that
-were published later hold 14,039 and 1,021). Room-to-Room has no seen test split; ours has one of the size
-of its seen validation split."""
+"""The dissertation does not tabulate VLN: Anderson et al. 2018, section 4.4 (61 scenes with 14,025 training and 1,020
+seen validation instructions, 11 scenes with 2,349, 18 scenes with 4,173; the files that were published later hold
+14,039 and 1,021). Room-to-Room has no seen test split; ours has one of the size of its seen validation split."""
 
 
 VLN_RADIUS = 3.0

@@ -47,8 +47,7 @@ DULL, SHARP_RAYS, DULL_RAYS = 0.1, 1 / 3, 2
 """Roughness from which a metal's picture is so blurred that it is made per luxel, with many rays lest grain is left;
 and the rays of sharp metals per texel and of dull ones per luxel, times the settings' `other_rays`."""
 AROUND = 0.15
-"""Addition to the blur of dull metals, tangent of an angle: what they show from elsewhere in the room is in it,
-too."""
+"""Addition to the blur of dull metals, tangent of an angle: what they show from elsewhere in the room is in it, too."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -113,9 +113,8 @@ def things_of(
 
 
 def coarsened(things: Sequence[UnwrappedThing], most: float) -> tuple[UnwrappedThing, ...]:
-    """The same things with at most `most` texels, if it takes no more than this: the largest floors lose a fifth
-    of their fineness first, then the largest patterned pieces a quarter. Mirrors (over 5 texels per luxel) stay
-    sharp."""
+    """The same things with at most `most` texels, if it takes no more than this: the largest floors lose a fifth of
+    their fineness first, then the largest patterned pieces a quarter. Mirrors (over 5 texels per luxel) stay sharp."""
     out = list(things)
     texels = lambda t: int(t.flat.size.prod()) * t.fineness**2
     total = sum(map(texels, out))

@@ -1,8 +1,7 @@
 """From light to picture: exposure and white balance that adapt from room to room, and the film curve.
 
-A camera carried through a house adapts to each room. Here every point in space has a gain per
-colour channel that changes smoothly through doors and openings, so that textures lit once can be
-shown with it and never show a step.
+A camera carried through a house adapts to each room. Here every point in space has a gain per colour channel that
+changes smoothly through doors and openings, so that textures lit once can be shown with it and never show a step.
 """
 
 import functools
