@@ -8,7 +8,6 @@ from pathlib import Path
 import cv2
 import mujoco
 import numpy as np
-import trimesh
 from scipy.spatial.transform import Rotation
 
 from embodied.assets.cache import digest, write_bytes
@@ -95,6 +94,8 @@ def _part(model: mujoco.MjModel, geom: int, owner: str, textures: Path) -> Part 
 
 def shape_of(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
     """Vertices, faces, normals and texture coordinates of a geom, in its own frame; None of what has no triangles."""
+    import trimesh  # late: people walk in small installations, too
+
     kind, size = mujoco.mjtGeom(int(model.geom_type[geom])), model.geom_size[geom]
     kinds = mujoco.mjtGeom
     if kind == kinds.mjGEOM_MESH:
