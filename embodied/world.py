@@ -25,7 +25,8 @@ from embodied.interface import Sighting
 from embodied.navigation.floor_ways import FreePoses
 from embodied.navigation.free_space import closed_doors
 from embodied.navigation.graph import NavGraph, build_graph
-from embodied.people.day import day_of, seconds_of
+from embodied.people.day import Day, day_of, lived_in, seconds_of
+from embodied.people.strolls import noticing
 from embodied.records import differences
 from embodied.render.camera import View
 from embodied.render.classic import Renderer
@@ -286,6 +287,33 @@ class World:
                 self._states.pop(next(iter(self._states))).close()
         return self._states[state]
 
+    def living(self, when: tuple[float, int] | None, openness: Mapping[str, float]) -> World:
+        """The house without its figures, and, in lit pictures, with those who live there: a world that this one keeps
+        and closes.
+
+        Args:
+          when: the second of their day, and the node whose viewer they look at if near; None shows nobody.
+          openness: of doors that are not at rest, as Moment.openness.
+        """
+        rest, world = self._homes
+        rest = rest.with_doors(openness)
+        if when is None or self.pictures.quality is None:
+            return rest
+        now = noticing(self._day.at(when[0]), self.graph.positions[when[1]], rest.house)
+        world._bake = rest.baked()
+        world.show(dataclasses.replace(now, openness={**openness, **now.openness}))
+        return world
+
+    @functools.cached_property
+    def _homes(self) -> tuple[World, World]:
+        """The house without its figures: at rest, and as its people have it."""
+        made_of = lived_in(self.house), self.catalogue, self.graph, self.cache, self.pictures
+        return World(*made_of), World(*made_of)
+
+    @functools.cached_property
+    def _day(self) -> Day:
+        return day_of(self._homes[0].house, self.catalogue, seed=0)
+
     def _bring_up_to_date(self, slack: float = 0.0, shadows: bool = True) -> None:
         """Draw the moment from now on."""
         self._recent.cache_clear()
@@ -545,7 +573,7 @@ class World:
                 renderer.close()
         self._renderer = self._watcher = self._tracer = self._moving = None
         self._moments = [Moment()]
-        for world in self._states.values():
+        for world in (*self._states.values(), *self.__dict__.pop("_homes", ())):
             world.close()
         self._states = {}
         if self._file is not None:

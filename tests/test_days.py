@@ -15,8 +15,10 @@ from embodied.datasets.store import StoredPlace
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.moment import Moment
 from embodied.house.shapes import inward
-from embodied.interface import FindObject, Mode, Pose, Route, Situation, Task
-from embodied.navigation.free_space import free_floor, leaves
+from embodied.interface import FindObject, Mode, Pose, Route, Situation, Task, viewpoint
+from embodied.kinds.shipped.hanna import HANNA
+from embodied.kinds.task_kind import EnvInputs
+from embodied.navigation.free_space import free_floor, leaves, sight_floor
 from embodied.navigation.graph import AGENT_RADIUS, build_graph
 from embodied.people.day import day_of, seconds_of
 
@@ -100,6 +102,29 @@ def test_living_people_answer_where_they_are_awake_and_move_while_an_episode_goe
             manned.update((hour, room) for room in rooms)
     assert not any(hour == 3.0 for hour, _ in manned)
     assert len({room for _, room in manned}) > 1 and {hour for hour, _ in manned} >= {7.8, 18.6}
+
+
+def test_an_observation_among_living_people_names_the_second_only_where_somebody_is_in_sight():
+    house = generate_house(7, SMALL)
+    lives = day_of(house, CATALOGUE, seed=0)
+    place = StoredPlace(house, build_graph(house))
+    inputs = EnvInputs({house.name: place}, lambda name: (), "test", rules="living")
+    env, walls = HANNA.environments(inputs)(), sight_floor(house, 0)
+    sights = set()
+    for k in range(40):
+        for node in range(len(place.graph.positions)):
+            task = Task(f"t{k}", "hanna", house.name, Pose(node), FindObject("bed"), (0,), "find a bed", 2.0, 50)
+            seen, second = viewpoint(env.reset(task).sight).world, 60 * minute_of(task.id)
+            sights.add(seen)
+            now, eye = lives.at(second), place.graph.positions[node, :2]
+            lines = [shapely.LineString([eye, f.place.position[:2]]) for f in now.people.values()]
+            assert (now.openness or any(map(walls.covers, lines))) == (not seen.endswith("@"))
+            if not seen.endswith("@"):
+                then = float(seen.partition("@")[2].partition("/")[0])
+                assert then <= second and {n: f.place for n, f in lives.at(then).people.items()} == {
+                    n: f.place for n, f in now.people.items()
+                }
+    assert len(sights) > 10
 
 
 @pytest.mark.parametrize("time", ["25:00", "half past six", -1, float("nan"), "7:75"])

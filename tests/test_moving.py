@@ -21,7 +21,10 @@ from embodied.house.moment import Moment, MovingPerson, RigidPose
 from embodied.interface import Pose
 from embodied.light import bake
 from embodied.light.viewer import ViewerLight
+from embodied.navigation.doors import lived_name, place_named
 from embodied.navigation.graph import build_graph
+from embodied.people.day import errand
+from embodied.people.strolls import in_sight
 from embodied.render.classic import Renderer
 from embodied.render.pictures import Baked
 from embodied.scene.model import build_spec
@@ -350,3 +353,19 @@ def test_a_person_is_in_the_picture_in_ids_and_depth_and_shades_the_floor_and_le
     world.show(Moment())
     with pytest.raises(ValueError, match="no people"):
         world.show(Moment(people={"a": MovingPerson("nobody", RigidPose((1.0, 1.0, 0.0)), STANDING)}))
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_who_lives_here_is_in_the_picture_and_the_same_sight_is_the_same_picture_in_any_order(world):
+    with World(SUNNY, HandCatalogue(), world.graph, world.cache, _tiny()) as home:
+        home._homes[0]._bake = world.baked()
+        day = home._day = errand(SUNNY, next(iter(people().values())), (1.0, 1.5), (4.2, 3.2))
+        node = next(n for n, eye in enumerate(world.graph.positions) if in_sight(day.at(1.0), eye, SUNNY))
+        sight, places = lived_name(SUNNY.name, (1.0, node)), {SUNNY.name: home}
+        draw = lambda name: place_named(places, name).panorama(node)
+        somebody, nobody = draw(sight), draw(lived_name(SUNNY.name, None))
+        person = [*place_named(places, sight).classes].index("person")
+        assert (somebody.ids == person).any() and somebody.ids.max() > nobody.ids.max()
+        np.testing.assert_array_equal(draw(sight).rgb, somebody.rgb)
+        np.testing.assert_array_equal(world.panorama(node).rgb, nobody.rgb)

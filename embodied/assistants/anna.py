@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -12,7 +11,8 @@ import numpy as np
 from embodied.assets.catalogue import load_catalogue
 from embodied.house.shapes import room_at
 from embodied.interface import Intention, Place, Pose, Reply, Route, Situation, Subtask, Viewpoint
-from embodied.people.day import Day, day_of
+from embodied.people.day import Day, day_of, lived_in
+from embodied.people.strolls import in_sight
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
@@ -104,10 +104,14 @@ class Residents(Anna):
         name, rooms = situation.task.world, self._homes[situation.task.world].rooms[near]
         return near[np.isin(rooms, self._manned(name, minute_of(situation.task.id) + situation.time))]
 
+    def seen_from(self, name: str, node: int, minute: int) -> tuple[float, int] | None:
+        """The second of the day that is seen from a node, and the node; None where nobody is in sight."""
+        day, place = self._day(name), self._places[name]
+        moment, eye = day.at(second := day.since(minute * 60)), place.graph.positions[node]
+        return (second, node) if moment.openness or in_sight(moment, eye, day.house) else None
+
     def _lived(self, name: str) -> Day:
-        house = self._places[name].house
-        alive = tuple(p for p in house.placements if p.object_class != "person")  # figures stand for the same people
-        return day_of(dataclasses.replace(house, placements=alive), self._catalogue(), seed=0)
+        return day_of(lived_in(self._places[name].house), self._catalogue(), seed=0)
 
     def _rooms(self, name: str, minute: int) -> list[str]:
         day, time = self._day(name), minute * 60

@@ -74,8 +74,8 @@ class TaskOptions:
     """Play N episodes at a time, which does not change results (default: 32 for trained agents, else 8)."""
     rules: Annotated[str | None, Option(metavar="WORD")] = None
     """Rules of play of the kind of task. hanna: people tell the way (told), walk it ahead, too (shown), or do so where
-    their day has them (living, living-shown). vnla: help in words (indirect, the default), the advisor acts and says it
-    (direct) or does not (direct-mute), Algorithm 6 as printed (algorithm-6)."""
+    their day has them and lit pictures show them (living, living-shown). vnla: help in words (indirect, the default),
+    the advisor acts and says it (direct) or does not (direct-mute), Algorithm 6 as printed (algorithm-6)."""
     closed_doors: float = 0.0
     """Close this share of the doors at the start of every task, besides those that its kind closes."""
     doors: Annotated[str, Option(words=DOOR_RULES)] = DOOR_RULES[0]

@@ -16,7 +16,7 @@ from embodied.navigation.graph import NavGraph, behind_doors
 P = TypeVar("P")
 BESIDE = 0.1
 """Metres from a closed leaf within which nobody stands when it is closed."""
-MARK = "|"
+MARK, LIVING = "|", "@"
 """Between the name of a house and how its doors differ from the house at rest, in the name of what is seen there."""
 
 
@@ -76,12 +76,23 @@ def changed_doors(graph: NavGraph, closed: Collection[str]) -> dict[str, float]:
     return {d: float("/" in d or d not in closed) for d in sorted(graph.closed.symmetric_difference(closed))}
 
 
+def lived_name(seen: str, moment: tuple[float, int] | None) -> str:
+    """Name of what is seen from a node, as `seen_name` has it, among who lives there: the second of the day, and the
+    node that they look at, or nobody."""
+    return f"{seen}{'' if MARK in seen else MARK}{LIVING}" + ("" if moment is None else f"{moment[0]:g}/{moment[1]}")
+
+
 def place_named(places: Mapping[str, P], name: str) -> P:
-    """The place that a sight is of, by the name that `seen_name` gave it.
+    """The place that a sight is of, by the name that `seen_name` or `lived_name` gave it.
 
     Raises:
       KeyError: of another house.
     """
-    house, _, doors = name.partition(MARK)
+    house, _, now = name.partition(MARK)
+    doors, living, moment = now.partition(LIVING)
     openness = {d: float(x) for d, _, x in (part.partition("=") for part in doors.split(",") if part)}
+    if living:
+        second, _, node = moment.partition("/")
+        when = (float(second), int(node)) if moment else None
+        return places[house].living(when, openness)  # type: ignore[attr-defined]
     return places[house].with_doors(openness) if openness else places[house]  # type: ignore[attr-defined]

@@ -114,6 +114,12 @@ class Day:
         figures = {n: self._figure(self.figures[n], p, now) for n, p in home.items()}
         return Moment(openness=errands.openness(self.doors, now), people=figures)
 
+    def since(self, time: float) -> float:
+        """The first second from which on everybody is as at a time, in seconds; that time where somebody moves."""
+        pieces = self.now(time).values()
+        moves = any(p.leg or p.settled[0] != p.settled[1] or p.end - time < POSE_SECONDS for p in pieces)
+        return time if moves else min(time, max(p.begin for p in pieces) + POSE_SECONDS)
+
     def now(self, time: str | float) -> dict[str, Piece]:
         """Everybody's piece of the day; its activity is 'out', and it has no leg, where they are not at home."""
         now = seconds_of(time)
@@ -182,6 +188,12 @@ def day_of(house: House, catalogue: Catalogue, *, seed: int) -> Day:
     for when, name, activity in sorted(wishes):
         planner.go(name, activity, when)
     return Day(house, figures, planner.pieces, planner.doors)
+
+
+def lived_in(house: House) -> House:
+    """The house without its figures, who stand for the same people as those who live there."""
+    alive = tuple(p for p in house.placements if p.object_class != "person")
+    return dataclasses.replace(house, placements=alive)
 
 
 def errand(

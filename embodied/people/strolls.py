@@ -186,14 +186,15 @@ _sight = functools.lru_cache(16)(sight_floor)
 
 def noticing(moment: Moment, eye: np.ndarray, house: House) -> Moment:
     """The moment in which people look at (3,) an eye that is near and in sight."""
-    storey = sum(s.elevation < eye[2] for s in house.storeys[1:])
-    figures = dict(moment.people)
-    for name, f in moment.people.items():
-        at = np.array(f.place.position)
-        line, near = shapely.LineString([eye[:2], at[:2]]), np.linalg.norm(eye[:2] - at[:2]) < NOTICED
-        if near and _sight(house, storey).covers(line):
-            figures[name] = looking(f, eye)
-    return dataclasses.replace(moment, people=figures)
+    near = {n: looking(f, eye) for n, f in in_sight(moment, eye, house, NOTICED).items()}
+    return dataclasses.replace(moment, people={**moment.people, **near})
+
+
+def in_sight(moment: Moment, eye: np.ndarray, house: House, reach: float = math.inf) -> dict[str, MovingPerson]:
+    """Who is within so many metres of (3,) an eye, and no wall or closed door between; furniture hides nobody here."""
+    floor = _sight(house, sum(s.elevation < eye[2] for s in house.storeys[1:]))
+    lines = {n: shapely.LineString([eye[:2], f.place.position[:2]]) for n, f in moment.people.items()}
+    return {n: moment.people[n] for n, line in lines.items() if line.length < reach and floor.covers(line)}
 
 
 def who_is_about(house: House, count: int, *, rng: np.random.Generator) -> list[str]:

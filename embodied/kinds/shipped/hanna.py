@@ -6,11 +6,12 @@ import functools
 import numpy as np
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.assistants.anna import Anna, Residents
+from embodied.assistants.anna import Anna, Residents, minute_of
 from embodied.envs.base import HelpEnv, required
 from embodied.interface import Ask, Episode, Mode, Move, Observation, Place, Reply, Stop, Viewpoint
 from embodied.kinds import task_kind
 from embodied.kinds.splits import Splits, five_splits
+from embodied.navigation.doors import lived_name
 from embodied.navigation.graph import NavGraph
 from embodied.policies import baselines
 from embodied.policies.listeners import ListeningInterpreter
@@ -46,6 +47,15 @@ def tasks(inputs: task_kind.TaskInputs, parts: task_kind.Parts) -> task_kind.Par
 
 class HannaEnv(HelpEnv):
     """Algorithm 7 of dissertation 4.2.2: two modes, people who know routes, images of where to go."""
+
+    residents: Residents | None = None
+    """Who live in the houses, and are seen where their day has them."""
+
+    def seen_from(self, node: int) -> str:
+        seen = super().seen_from(node)
+        if self.residents is None:
+            return seen
+        return lived_name(seen, self.residents.seen_from(self.task.world, node, minute_of(self.task.id) + self.time))
 
     def _replied(self, reply: Reply) -> None:
         subtask = required(reply.subtask, "sub-task in the reply")
@@ -98,12 +108,16 @@ def environments(inputs: task_kind.EnvInputs) -> task_kind.EnvMaker:
     if inputs.rules not in HANNA_RULES:
         raise ValueError(f"rules of HANNA should be one of {HANNA_RULES}, got {inputs.rules!r}")
     split = inputs.wording
-    if inputs.rules.startswith("living"):
-        anna: Anna = Residents(worlds, routes, split=split)
-    else:
-        anna = Anna({name: w.graph for name, w in worlds.items()}, routes, split=split)
+    living = Residents(worlds, routes, split=split) if inputs.rules.startswith("living") else None
+    anna = living or Anna({name: w.graph for name, w in worlds.items()}, routes, split=split)
     moves, rule = PanoramicMoves(), ShowingEnv if inputs.rules.endswith("shown") else HannaEnv
-    return lambda: rule(worlds, inputs.assistant or anna, moves)
+
+    def make() -> HannaEnv:
+        env = rule(worlds, inputs.assistant or anna, moves)
+        env.residents = living
+        return env
+
+    return make
 
 
 def subtask_success(episode: Episode, graph: NavGraph) -> float:
