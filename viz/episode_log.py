@@ -4,26 +4,15 @@ text."""
 from dataclasses import dataclass
 from pathlib import Path
 
+from embodied.assets.json_file import read_toml
 from embodied.assistants.descriptions import described
 from embodied.interface import Ask, Episode, Intention, Mode, Place, Pose, Reply, Step, Task, Viewpoint
 from embodied.kinds.task_kind import kind_named
 from embodied.language.plain_language import detokenized
 from embodied.records import load_lines
 
-QUESTIONS = {
-    Intention.HELP: "Can you help me?",
-    Intention.CUR: "Where am I?",
-    Intention.GOAL: "Where should I go?",
-    Intention.SUB: "Can you give me a nearer goal?",
-    Intention.CONFIRM: "Is it this one?",
-    Intention.APPEARANCE: "What does it look like?",
-    Intention.REGION: "Which room is it in?",
-    Intention.ROUTE: "How do I get there?",
-    Intention.DISAMBIGUATE: "Which of these do you mean?",
-    Intention.FREE: "May I ask something?",
-}
-
-
+LOOKS = read_toml(Path(__file__).with_name("looks.toml"))
+QUESTIONS = {Intention(name): words for name, words in LOOKS["questions"].items()}
 DIALOGUE_ROWS, DIALOGUE_COLUMNS = 11, 95
 """Lines of text that there is room for, a gap between two speakers being one, and their letters."""
 

@@ -32,21 +32,12 @@ from embodied.people.strolls import noticing
 from embodied.render.camera import camera_at
 from embodied.render.panorama import Panorama, Recognised
 from embodied.render.photograph import PhotoCamera
-from embodied.viz.episode_log import EpisodeLog, question_of
+from embodied.viz.episode_log import LOOKS, EpisodeLog, question_of
 from embodied.viz.house3d import light_meshes, lit_meshes, log_meshes, log_people
 from embodied.viz.sinks import Sinks, blueprint_of, open_recording
 from embodied.world import World
 
-PALETTE = {
-    "graph": (120, 130, 150),
-    "path": (31, 119, 255),
-    "route": (255, 160, 30),
-    "goal": (20, 190, 90),
-    "start": (90, 90, 90),
-    "agent": (31, 119, 255),
-    "person": (255, 120, 0),
-    "recognised": (60, 220, 255),
-}
+PALETTE = {name: tuple(colour) for name, colour in LOOKS["colours"].items()}
 HEIGHTS = {"node": 0.05, "mark": 0.06, "path": 0.10, "route": 0.13, "body": 0.20}
 """Metres above the floor that things are drawn at, so that none hides another."""
 VIEW_VFOV, ONE_VIEW = np.deg2rad(75.0), np.deg2rad(60.0)

@@ -110,7 +110,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         args = parser(*[a for a in argv if a in COMMANDS][:1], words=argv).parse_args(argv)
         with warnings.catch_warnings():
-            warnings.showwarning = _show_warning
+            warnings.showwarning = lambda message, *_, **__: print(f"warning: {message}", file=sys.stderr)
             return args.run(args) or 0
     except KeyboardInterrupt:
         print("\nstopped; finished parts are kept and the same command goes on from there", file=sys.stderr)
@@ -147,8 +147,3 @@ def _close_bars() -> None:
     tqdm = sys.modules.get("tqdm")
     for bar in list(getattr(getattr(tqdm, "tqdm", None), "_instances", ())):
         bar.close()
-
-
-def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    """Warnings as one line, without a piece of source."""
-    print(f"warning: {message}", file=sys.stderr)

@@ -6,9 +6,11 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
+from embodied.assets.json_file import from_plain, read_toml
 from embodied.generate.access import Link, connect, has_outer_doors, score, walls_between, ways_between, worth_above
 from embodied.generate.footprint import Band, Cap, Footprint, Rect, Strip, shared_area
 from embodied.generate.modules import THROUGH, Cell, Module, Slot, arrange, draw_modules, width
@@ -22,26 +24,8 @@ BESIDE_STAIRS = 16
 PARENTS = 6
 """Candidates kept as parents."""
 MAIN_SUITE = ("main_bedroom", "bathroom")
-CAP_STARTS = (
-    ("living_room",),
-    ("living_room", "dining_room"),
-    ("living_room", "kitchen"),
-    ("family_room", "living_room"),
-    ("living_room", "library"),
-    ("garage", "kitchen"),
-    ("garage",),
-)
-CAP_ENDS = (
-    ("main_bedroom",),
-    MAIN_SUITE,
-    ("gym",),
-    ("living_room",),
-    ("family_room",),
-    ("guest_room",),
-    ("library",),
-    ("playroom",),
-)
-"""Rooms that may fill the public and the private end of a wing; MAIN_SUITE takes all rooms of the main bedroom."""
+CAPS = from_plain(dict[str, tuple[tuple[str, ...], ...]], read_toml(Path(__file__).with_name("caps.toml")))
+"""Rooms that may fill the ends of a wing; MAIN_SUITE takes all rooms of the main bedroom."""
 
 
 Rows = list[list[tuple[Module, int]]]
@@ -218,7 +202,7 @@ def _fill_cap(cap: Cap, modules: list[Module], cells: list[Cell], rng: np.random
     area = (x1 - x0) * (y1 - y0) / 100
     by_kind = {m.main.kind: m for m in reversed(modules)}
     fits: list[tuple[float, list[WantedRoom], list[Module]]] = []
-    for option in CAP_STARTS if cap.at_start else CAP_ENDS:
+    for option in CAPS["starts" if cap.at_start else "ends"]:
         used, parts = _cap_rooms(option, by_kind)
         if parts:
             ratio = area / sum(s.area for s in parts)

@@ -133,7 +133,9 @@ class HelpGymEnv(LiveEnv):
         check_options(render_mode, patience=patience)
         if not tasks:
             raise ValueError("there are no tasks to play; choose another split or a larger scale")
-        self._env, self._tasks, self._sensor, self._layout = make_env(), tuple(tasks), sensor, layout
+        self._env, self._tasks, self._sensor = make_env(), tuple(tasks), sensor
+        self.layout = layout
+        """The sizes of the spaces."""
         self._shaping, self._strict, self._patience = shaping, strict, patience
         self._needs_stop = needs_stop
         self.action_space: gym.Space[Any] = action_space(layout)
@@ -151,9 +153,10 @@ class HelpGymEnv(LiveEnv):
         super().reset(seed=None if seed is None else checked_seed(seed))
         drawn = int(self.np_random.integers(len(self._tasks)))
         task = self._tasks[drawn if chosen is None else chosen]
-        self._o = self._env.reset(task, seed=int(self.np_random.integers(2**31)))
+        self.observed = self._env.reset(task, seed=int(self.np_random.integers(2**31)))
+        """The last observation, before it became numbers."""
         self._invalid = 0
-        return self._encoded(self._o), {"task": task.id} | self._words()
+        return self._encoded(self.observed), {"task": task.id} | self._words()
 
     def chosen(self, options: Mapping[str, Any] | None) -> int | None:
         """The number of the task that options["task"] names; None where it names none.
@@ -178,7 +181,7 @@ class HelpGymEnv(LiveEnv):
     def step(self, action: int) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         before = self._env.potential() if self._shaping else 0.0
         try:
-            o = self._env.step(decode(action, self._layout))
+            o = self._env.step(decode(action, self.layout))
         except ActionError as e:
             if self._strict or self._env.ended is not None:
                 raise
@@ -186,29 +189,19 @@ class HelpGymEnv(LiveEnv):
             if over := self._invalid >= self._patience:
                 self._env.cut_short()
             info = {"invalid_action": str(e)} | self._words() | self._judged()
-            return self._encoded(self._o), -STEP_COST, False, over, info
+            return self._encoded(self.observed), -STEP_COST, False, over, info
         ended = self._env.ended
         info = self._judged()
         reward = self._env.reward(0.0 if ended is None else info["success"])
         if self._shaping:
             reward += before - self._env.potential()
-        self._o = o if o is not None else self._o
+        self.observed = o if o is not None else self.observed
         info |= self._env.facts() | self._words()
-        return self._encoded(self._o), float(reward), ended == "stop", ended == "limit", info
+        return self._encoded(self.observed), float(reward), ended == "stop", ended == "limit", info
 
     def _picture(self) -> np.ndarray:
         """(544, 1120, 3) uint8: the agent's view, the plan with its path, and what was said."""
-        return picture(self._env, self._o)
-
-    @property
-    def layout(self) -> SpaceLayout:
-        """The sizes of the spaces."""
-        return self._layout
-
-    @property
-    def observed(self) -> Observation:
-        """The last observation, before it became numbers."""
-        return self._o
+        return picture(self._env, self.observed)
 
     @property
     def task(self) -> Task:
@@ -241,13 +234,13 @@ class HelpGymEnv(LiveEnv):
         return instance_classes(self.house)
 
     def _words(self) -> dict[str, Any]:
-        o = self._o
+        o = self.observed
         words = lambda k: {"action": k, "heading": float(o.candidates.bearing[k]), "text": direction_of(o, k)}
         candidates = tuple(words(int(k)) for k in np.flatnonzero(o.candidates.allowed))
         return {"request": self._env.task.request, "instruction": o.instruction, "candidates": candidates}
 
     def _encoded(self, o: Observation) -> dict[str, Any]:
-        return encode(o, self._sensor, self._layout)
+        return encode(o, self._sensor, self.layout)
 
     def _judged(self) -> dict[str, Any]:
         """Success and SPL, and once the episode has ended all metrics of every task."""

@@ -7,15 +7,9 @@ from embodied.assets.closure import code_digest
 from embodied.assets.json_file import from_plain, read_toml
 
 UNCOUNTED_BY_LIGHT = (
-    "embodied.assets",
-    "embodied.assets.catalogue",
-    "embodied.assets.data",
-    "embodied",
-    "embodied.light",
-    "embodied.light.settings",
-    "embodied.scene.house_meshes",
-    "tqdm",
-)
+    "embodied.assets", "embodied.assets.catalogue", "embodied.assets.data", "embodied", "embodied.light",
+    "embodied.light.settings", "embodied.scene.house_meshes", "tqdm",
+)  # fmt: skip
 """Modules that the code of a bake does not count: what builds a house's parts and the settings, since the parts and the
 settings themselves are in a bake's key; what packages offer by name; the progress bar."""
 

@@ -263,9 +263,6 @@ class DiscreteViews:
         """Row of its viewpoint in the graphs."""
         return self._codes[agent] // VIEWS
 
-    def here(self, agent: int) -> ViewPoint:
-        return self.lookout.view(self._codes[agent])[1][0]
-
     def locations(self, agent: int) -> tuple[ViewPoint, ...]:
         return self.lookout.view(self._codes[agent])[1]
 

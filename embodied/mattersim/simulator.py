@@ -60,7 +60,7 @@ class SimState:
     @property
     def location(self) -> ViewPoint | None:
         """None before the first episode."""
-        return self._motion.here(self._agent) if self._motion.started else None
+        return self._motion.locations(self._agent)[0] if self._motion.started else None
 
     @property
     def heading(self) -> float:
@@ -80,6 +80,17 @@ class SimState:
     def navigableLocations(self) -> list[ViewPoint]:
         """Its own location first, then the others from the middle of the view outwards."""
         return list(self._motion.locations(self._agent)) if self._motion.started else []
+
+
+def _setting(name: str, of: Callable[[Any], object]) -> Callable[[Any, Any], None]:
+    """A method that sets `name` to of(value), and changes nothing once `initialize` was called."""
+
+    def change(simulator: Any, value: Any, /) -> None:
+        new = of(value)
+        if not simulator._ready:
+            setattr(simulator, name, new)
+
+    return change
 
 
 class Simulator:
@@ -104,39 +115,21 @@ class Simulator:
 
     # Settings -----------------------------------------------------------------------------------
 
-    def setDatasetPath(self, path: str, /) -> None:
-        """Folder of `<scan>/matterport_skybox_images`."""
-        self._set("_dataset_path", str(path))
-
-    def setNavGraphPath(self, path: str, /) -> None:
-        """Folder of scans.txt and of `<scan>_connectivity.json`."""
-        self._set("_graph_path", str(path))
-
-    def setRenderingEnabled(self, value: bool, /) -> None:
-        self._set("_rendering", bool(value))
-
-    def setDiscretizedViewingAngles(self, value: bool, /) -> None:
-        self._set("_discrete", bool(value))
-
-    def setRestrictedNavigation(self, value: bool, /) -> None:
-        self._set("_restricted", bool(value))
-
-    def setPreloadingEnabled(self, value: bool, /) -> None:
-        """Nothing: skyboxes are read when they are looked at; no more than setCacheSize are kept."""
-
-    def setDepthEnabled(self, value: bool, /) -> None:
-        self._set("_depth", bool(value))
-
-    def setBatchSize(self, size: int, /) -> None:
-        self._set("_batch", operator.index(size))
-
-    def setCacheSize(self, size: int, /) -> None:
-        """How many decoded skyboxes are kept; one of 512 pixels takes 6 MB, and 6 more with depth."""
-        self._set("_cache", operator.index(size))
-
-    def setSeed(self, seed: int, /) -> None:
-        """Of newRandomEpisode, whose draws are our own."""
-        self._set("_seed", operator.index(seed))
+    setDatasetPath = _setting("_dataset_path", str)
+    """Folder of `<scan>/matterport_skybox_images`."""
+    setNavGraphPath = _setting("_graph_path", str)
+    """Folder of scans.txt and of `<scan>_connectivity.json`."""
+    setRenderingEnabled = _setting("_rendering", bool)
+    setDiscretizedViewingAngles = _setting("_discrete", bool)
+    setRestrictedNavigation = _setting("_restricted", bool)
+    setPreloadingEnabled = _setting("_preloading", bool)
+    """Changes nothing: skyboxes are read when they are looked at; no more than setCacheSize are kept."""
+    setDepthEnabled = _setting("_depth", bool)
+    setBatchSize = _setting("_batch", operator.index)
+    setCacheSize = _setting("_cache", operator.index)
+    """How many decoded skyboxes are kept; one of 512 pixels takes 6 MB, and 6 more with depth."""
+    setSeed = _setting("_seed", operator.index)
+    """Of newRandomEpisode, whose draws are our own."""
 
     def setCameraResolution(self, width: int, height: int, /) -> None:
         """Pixels; enters the navigable field of view even without rendering."""
@@ -153,10 +146,6 @@ class Simulator:
         """True where the limits lie within a right angle on either side of the horizon; discretized elevations have
         their own."""
         return -math.pi / 2 < float(low) < 0.0 < float(high) < math.pi / 2
-
-    def _set(self, name: str, value: object) -> None:
-        if not self._ready:
-            setattr(self, name, value)
 
     # Play ---------------------------------------------------------------------------------------
 
