@@ -11,7 +11,9 @@ the files that `embodied export` writes:
 
 runs a script of theirs, unchanged, with the stand-in in the place of `MatterSim`. In a program of your own:
 
-    from embodied import mattersim mattersim.install("upstream") import MatterSim
+    from embodied import mattersim
+    mattersim.install("upstream")
+    import MatterSim
 
 It is a launcher and not a top-level module of the wheel, because the dialects are modules of one name,
 and because an installed `MatterSim` would come before a real one that the programs append to their path.
