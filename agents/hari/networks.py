@@ -186,9 +186,6 @@ def shown_probabilities(log_moves: Tensor) -> Tensor:
 
 
 HARI_REMEDY = "train it again with `embodied train hari`"
-OLDER_NAMES = {".before.": ".norm1.", ".between.": ".norm2.", ".widen.": ".linear1.", ".narrow.": ".linear2."}
-OLDER_NAMES |= {".query.": ".self_attn.in_proj_", ".merge.": ".self_attn.out_proj."}
-"""Of a Transformer's modules, and those of torch.nn.TransformerEncoderLayer."""
 
 
 @dataclass(frozen=True)
@@ -277,14 +274,4 @@ def load_agent(path: Path) -> HariAgent:
 
 
 def _of(part: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-    """The tensors of a part, those of Transformers by torch's names, which older files lack."""
-    named = {}
-    for name, tensor in tensors.items():
-        if ".layers." in name:
-            if ".query." in name:
-                tensor = torch.cat([tensor, tensors[name.replace("query", "looked_at")]])
-            for older, new in OLDER_NAMES.items():
-                name = name.replace(older, new)
-        if name.startswith(f"{part}.") and ".looked_at." not in name:
-            named[name.removeprefix(f"{part}.")] = tensor
-    return named
+    return {k.removeprefix(f"{part}."): v for k, v in tensors.items() if k.startswith(f"{part}.")}
