@@ -123,8 +123,6 @@ def training(function: str, kind: str) -> Callable[..., None]:
     return train
 
 
-# Studies ------------------------------------------------------------------------------------------
-
 Tables = Annotated[tuple[str, ...], options.Option(metavar="TABLE", name="TABLE")]
 Seeds = Annotated[int, options.Option(options.whole(1, options.REPEATS), "N")]
 

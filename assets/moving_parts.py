@@ -208,9 +208,6 @@ def _where(parts: Sequence[MeshPart], labels: Sequence[np.ndarray], label: int) 
     return tuple(out)
 
 
-# ------------------------------------------------------------------ finding
-
-
 @dataclass(frozen=True, eq=False)
 class _Pieces:
     """Connected pieces of all meshes of a thing; n of them."""
@@ -399,9 +396,6 @@ def _named(parts: Sequence[MovingPart]) -> list[MovingPart]:
             names = [f"left_{word}", f"right_{word}"]
         out += [dataclasses.replace(p, name=name) for p, name in zip(some, names, strict=True)]
     return out
-
-
-# ------------------------------------------------------------------ insides
 
 
 def _hole(m: MovingPart, is_round: bool) -> Corners:

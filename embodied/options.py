@@ -31,9 +31,6 @@ REPEATS = 1000
 """Most repeats of a study."""
 
 
-# Types of arguments -----------------------------------------------------------------------------
-
-
 def whole(least: int = 1, most: int = LARGEST_COUNT, *, even: bool = False) -> Callable[[str], int]:
     """Whole numbers from `least` to `most`, both included."""
     wanted = f"{'an even' if even else 'a whole'} number of at least {least}"
@@ -142,9 +139,6 @@ PICTURE_HELP = {
     "traced": "rays are traced into the baked light",
     "reference": "path tracing, slow",
 }
-
-
-# Options from records -----------------------------------------------------------------------------
 
 
 @dataclasses.dataclass(frozen=True, eq=False)  # annotations are hashed

@@ -299,9 +299,6 @@ def stop_signal() -> Iterator[threading.Event]:
         signal.signal(signal.SIGINT, before)
 
 
-# What an update draws, and how it descends -------------------------------------------------------
-
-
 def tasks_of_update(tasks: Sequence[T], update: int, batch: int, seed: int) -> list[T]:
     """The tasks (or sentences, or whatever is learned from) of one update: each once per pass, each pass in its own
     random order."""

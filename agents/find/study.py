@@ -171,9 +171,6 @@ def train_finder(
     imitation.train(learner, validation, folder, identity, note=note)
 
 
-# What there is to be read -------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Labels:
     """Labels of all views of some houses: n viewpoints."""

@@ -149,9 +149,6 @@ def refuse_unknown(names: Iterable[str], known: Iterable[str], what: str) -> Non
         raise ValueError(f"unknown {what} {unknown}; there are {there}")
 
 
-# Runs --------------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class _Job:
     """One run and its judgings."""
@@ -250,9 +247,6 @@ def _storable(samples: Samples) -> Samples:
     weights = samples.weights or (1.0,) * len(samples.values)
     kept = [(v, w) if v == v else (0.0, 0.0) for v, w in zip(samples.values, weights, strict=True)]
     return dataclasses.replace(samples, values=tuple(v for v, _ in kept), weights=tuple(w for _, w in kept))
-
-
-# Tables ------------------------------------------------------------------------------------------
 
 
 def _write(

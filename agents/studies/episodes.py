@@ -41,8 +41,6 @@ class EpisodeStudy(StudyLearner):
     def judges(self) -> tuple[str, ...]:
         return (*JUDGES, *self.makers)
 
-    # What a learner says ------------------------------------------------------------------------
-
     def settings(self, train: Mapping[str, Any], seed: int) -> object:
         """The settings, a record, with what differs in a row."""
         raise NotImplementedError
@@ -54,8 +52,6 @@ class EpisodeStudy(StudyLearner):
     def policies(self, agent: Any, judge: Mapping[str, Any], split: str) -> Agent:
         """Who plays; `agent` is None in rows that do not learn."""
         raise NotImplementedError
-
-    # What it may say otherwise ------------------------------------------------------------------
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
         """All that a run depends on besides its settings."""
@@ -72,8 +68,6 @@ class EpisodeStudy(StudyLearner):
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
         """Counts of some episodes."""
         return measured(episodes, {name: place.graph for name, place in split.worlds.items()})
-
-    # What the engine asks -----------------------------------------------------------------------
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Identity:
         return identity_of(*self.makers, settings=self.settings(train, seed), **self.depends(train))

@@ -287,9 +287,6 @@ def _learned_in(source: StripSource, config: StripTraining) -> Identity:
     )
 
 
-# Features ----------------------------------------------------------------------------------------
-
-
 def make_features(extract: Extractor, names: Sequence[str], *, workers: int = 1, note: Note = print) -> None:
     """Extract the missing features of some houses."""
 

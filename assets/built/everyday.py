@@ -16,9 +16,6 @@ def _leaf(x: float, y: float, z: float, w: float, d: float, turn: float, thick: 
     return box([-w / 2, -d / 2, 0], [w / 2, d / 2, thick]).turned(turn).moved(x, y, z)
 
 
-# ------------------------------------------------------------------ paper
-
-
 def post(spec: BuildRequest) -> list[MeshPart]:
     """Letters in a loose heap, some with a window, one brown."""
     (w, d, h), rng = spec.size, spec.rng
@@ -152,9 +149,6 @@ def folders(spec: BuildRequest) -> list[MeshPart]:
     return parts_of(*((plain(TINTS[n], 0.55), s) for n, s in sorted(bodies.items())), ("paper", labels))
 
 
-# ------------------------------------------------------------------ electric
-
-
 def cable(spec: BuildRequest) -> list[MeshPart]:
     """A charger with its cable in loops."""
     (w, d, h), rng = spec.size, spec.rng
@@ -167,9 +161,6 @@ def cable(spec: BuildRequest) -> list[MeshPart]:
     plug = box([-0.014, -0.02, 0], [0.014, 0.02, h], 0.004).moved(end[0], end[1])
     tip = box([-0.004, -0.012, 0], [0.004, 0.012, 0.006], 0.001).moved(*path[0, :2])
     return parts_of((plain(_tint(spec), 0.45), [tube(path, 0.0022, 6), plug]), ("steel", tip))
-
-
-# ------------------------------------------------------------------ cloth
 
 
 def _crumpled(size: Size, cells: int, roundness: float, *, rng: np.random.Generator) -> Shape:
@@ -226,9 +217,6 @@ def duvet(spec: BuildRequest) -> list[MeshPart]:
     top, low = sheet(np.stack([px, py, rise], -1)), sheet(np.stack([px, py, 0 * rise], -1))
     cloth = joined(top, low.reversed()).shifted_uv(*rng.random(2))
     return parts_of((spec.material("cloth", "cotton/0"), cloth))
-
-
-# ------------------------------------------------------------------ kitchen and bath
 
 
 def dish_rack(spec: BuildRequest) -> list[MeshPart]:
@@ -313,9 +301,6 @@ def duck(spec: BuildRequest) -> list[MeshPart]:
     return parts_of(
         (plain(TINTS["yellow"], 0.35), [body, head, tail]), (plain(TINTS["orange"], 0.4), beak), ("black", eyes)
     )
-
-
-# ------------------------------------------------------------------ toys and games
 
 
 def blocks(spec: BuildRequest) -> list[MeshPart]:

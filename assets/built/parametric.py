@@ -134,9 +134,6 @@ def surface(
     return SupportSurface(name, z, x - w, y - d, x + w, y + d, headroom)
 
 
-# ------------------------------------------------------------------ cabinet work
-
-
 def front(x0: float, x1: float, z0: float, z1: float, y: float, style: str = "flat", thick: float = 0.02) -> Shape:
     """A door or drawer front whose face is at y: 'flat' or 'shaker' (frame and sunk panel)."""
     g = 0.002

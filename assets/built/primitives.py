@@ -60,9 +60,6 @@ class Shape:
         return Shape(self.vertices, self.faces, self.normals, self.uv + [u, v])
 
 
-# ------------------------------------------------------------------ putting shapes together
-
-
 def joined(*shapes: Shape) -> Shape:
     """All `shapes` as one."""
     starts = np.cumsum([0, *(len(s.vertices) for s in shapes)])
@@ -101,9 +98,6 @@ def fitted(parts: Sequence[MeshPart], size: Sequence[float]) -> tuple[MeshPart, 
         vertices, normals = (p.vertices - origin) * factors, _unit(p.normals / factors)
         done.append(MeshPart(vertices.astype(np.float32), p.faces, normals.astype(np.float32), p.uv, p.finish))
     return tuple(done)
-
-
-# ------------------------------------------------------------------ flat things
 
 
 def quads(corners: ArrayLike, uv: np.ndarray | None = None) -> Shape:
@@ -198,9 +192,6 @@ def unrolled_uv(ring: np.ndarray, v0: float, v1: float) -> np.ndarray:
     uv[:, [0, 3], 0], uv[:, [1, 2], 0] = along[:-1, None], along[1:, None]
     uv[:, :2, 1], uv[:, 2:, 1] = v0, v1
     return uv
-
-
-# ------------------------------------------------------------------ boxes
 
 
 def _box_corners() -> tuple[np.ndarray, np.ndarray]:
@@ -305,9 +296,6 @@ def frame(
     ]
 
 
-# ------------------------------------------------------------------ round things
-
-
 def lathe(profile: ArrayLike, segments: int = 24, crease: float = 0.7) -> Shape:
     """A surface of revolution about z of `profile` (k, 2): radius, height.
 
@@ -407,9 +395,6 @@ def tube(path: ArrayLike, radius: ArrayLike, segments: int = 8, closed: bool = F
         n = np.tile(tangent[i] * sign, (len(rim), 1))
         ends.append(Shape(rim, f if sign > 0 else f[:, ::-1], n, np.zeros((len(rim), 2))))
     return joined(shape, *ends)
-
-
-# ------------------------------------------------------------------ soft things
 
 
 def sheet(points: np.ndarray, thickness: float = 0.0) -> Shape:

@@ -1,4 +1,4 @@
-"""Pictures and patterns that are used once, not tiled: wall art, rugs, dials, covers."""
+"""Pictures and patterns that are used once, not tiled: wall art, rugs (from above, u along their length), dials, covers."""
 
 from collections.abc import Callable
 
@@ -60,9 +60,6 @@ def _blob(
     for k in range(1, 5):
         r += wobble / k * np.sin(k * a + rng.uniform(0, 6.28)) * rng.uniform(0.4, 1)
     return np.asarray(at) + radius * np.stack([r * np.cos(a), r * np.sin(a) * rng.uniform(0.7, 1.2)], 1)
-
-
-# ------------------------------------------------------------------ wall art
 
 
 def shapes(on: Canvas, ground: Color, colors: Colors) -> Maps:
@@ -245,9 +242,6 @@ def poster(on: Canvas, ground: Color, ink: Color, accent: Color) -> Maps:
     return maps_of(image, 0.75)
 
 
-# ------------------------------------------------------------------ rugs, seen from above, u along the length
-
-
 def oriental(on: Canvas, field: Color, border: Color, accent: Color, line: Color = (0.12, 0.10, 0.10)) -> Maps:
     """A knotted rug: medallion, mirrored field ornaments, main and guard borders."""
     rng = on.rng
@@ -351,9 +345,6 @@ def _pile(on: Canvas, image: np.ndarray, depth: float) -> Maps:
     tuft, fine, wear = on.noise(2.2, 1.4), on.noise(0.8, 0.8), on.fbm(2, 30, 1.2)
     out = image * (1 + depth * (0.5 * tuft + 0.5 * fine) + 0.02 * wear)[..., None]
     return maps_of(out, 0.96, 0.01, 0.97)
-
-
-# ------------------------------------------------------------------ dials and covers
 
 
 def dial(on: Canvas, face: Color, ink: Color, numerals: bool = True, hour: float = 10.15) -> Maps:

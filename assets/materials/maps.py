@@ -30,9 +30,6 @@ def maps_of(color: np.ndarray, roughness: np.ndarray | float, darkest: float = 0
     return Maps(np.clip(color, darkest, brightest).astype(np.float32), mean)
 
 
-# ------------------------------------------------------------------ noise
-
-
 def filtered(n: int, band: Callable[[np.ndarray, np.ndarray], np.ndarray], *, rng: np.random.Generator) -> np.ndarray:
     """White noise through the transfer function `band(fx, fy)`, frequencies in cycles per pixel."""
     white = rng.standard_normal((n, n), dtype=np.float32)
@@ -140,9 +137,6 @@ class Places:
     def fbm(self, low: float, high: float, slope: float = 1.6, stretch: float = 1.0) -> np.ndarray:
         """As Canvas.fbm, at these places."""
         return look_up(self.on.fbm(low, high, slope, stretch), self.x, self.y)
-
-
-# ------------------------------------------------------------------ layouts
 
 
 @dataclass(frozen=True, eq=False)

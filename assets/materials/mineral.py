@@ -76,9 +76,6 @@ def checker(on: Canvas) -> Maps:
     return Maps(np.where(black & ~joint, dark, made.color).astype("float32"), made.roughness)
 
 
-# ------------------------------------------------------------------ faces of tiles and slabs
-
-
 def glaze(at: Places, color: Color, mottle: float = 0.008) -> Face:
     """Glazed ceramic, nearly one colour."""
     cloud = at.fbm(3, 60, 1.3)
@@ -135,9 +132,6 @@ def travertine(at: Places, base: Color = (0.83, 0.76, 0.66), dark: Color = (0.70
     pits = smooth_step(at.noise(5.0, 1.4) + 0.4 * bands, 2.1, 2.6)
     color = mix(rgb(base), rgb(dark), np.clip(0.3 + 0.25 * bands + 0.1 * cloud, 0, 1)) * (1 - 0.25 * pits)[..., None]
     return color, 0.2 * pits
-
-
-# ------------------------------------------------------------------ without joints
 
 
 def slab(on: Canvas, surface: Callable[..., Face], gloss: float) -> Maps:

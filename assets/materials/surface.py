@@ -56,9 +56,6 @@ def wicker(on: Canvas, color: Color, strands: int = 24) -> Maps:
     return maps_of(out, 0.7, 0.01, 0.97)
 
 
-# ------------------------------------------------------------------ wallpaper
-
-
 def wallpaper(
     on: Canvas, ground: Color, inks: Colors, motif: Callable[..., list[np.ndarray]], woven: float = 0.5
 ) -> Maps:

@@ -408,9 +408,6 @@ PROGRAMS: Mapping[str, Program] = {
 }
 
 
-# -------------------------------------------------------------------------------------------------
-
-
 def _graphs(data: Dataset, folder: Path, more: Sequence[str] = ()) -> list[Path]:
     """The graphs of all houses, and of a scan `more` that has ANGLES' viewpoint alone."""
     lone = {"image_id": ANGLES[1], "pose": np.eye(4).ravel().tolist(), "included": True, "height": EYE}

@@ -55,9 +55,6 @@ FARTHEST, NEAREST = 30.0, 1.0
 """ObjectNav: metres between a start and the nearest object."""
 
 
-# Frames ------------------------------------------------------------------------------------------
-
-
 def to_habitat(point: Sequence[float]) -> list[float]:
     """(x, y, z) with z up as Habitat's [x, y, z] with y up."""
     x, y, z = (float(v) for v in point)
@@ -88,9 +85,6 @@ def yaw_of(rotation: Sequence[float]) -> float:
             "up: (0, sin, 0, cos) of half the angle"
         )
     return math.atan2(1 - 2 * y * y, -2 * w * y)
-
-
-# Episodes of ours --------------------------------------------------------------------------------
 
 
 def route_episodes(tasks: Iterable[Task], places: Mapping[str, Place]) -> list[ContinuousEpisode]:
@@ -152,9 +146,6 @@ def with_experts(
         whole = replace(e, expert=tuple(place for place, _ in passed))
         expert_episodes.append((whole, replace(trajectory, episode=whole)))
     return expert_episodes
-
-
-# Files -------------------------------------------------------------------------------------------
 
 
 def write_vlnce(

@@ -427,9 +427,6 @@ def _table_of_tasks(tasks: Sequence[str]) -> pa.Table:
     return table.replace_schema_metadata({b"pandas": json.dumps(about).encode()})
 
 
-# Statistics ---------------------------------------------------------------------------------------
-
-
 def _statistics(values: np.ndarray) -> dict[str, list]:
     """Of (n,) or (n, k) values: per number of a vector."""
     values = values.reshape(len(values), -1)

@@ -66,9 +66,6 @@ def seen_and_unseen(sizes: SplitSizes) -> Splits:
     return Splits(houses, five_splits(sizes.tasks, held, held, held, tested))
 
 
-# Scales -----------------------------------------------------------------------------------------
-
-
 def _small(train: int, extra: int, val: int, test: int, tasks: int, unseen: int) -> SplitSizes:
     return SplitSizes({"train": train, "extra": extra, "val": val, "test": test}, tasks, unseen)
 

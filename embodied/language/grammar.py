@@ -65,9 +65,6 @@ PLAIN_WEIGHT = 3.0
 """How much likelier than its other templates the first few of a clause are: what most people say."""
 
 
-# Saying -----------------------------------------------------------------------------------------
-
-
 def say(phrases: Sequence[Phrase], speaker: Speaker, *, rng: np.random.Generator) -> str:
     """Sentences in the speaker's habits, e.g. 'Leave the bedroom and turn left at once. Stop by the sofa.'"""
     pieces: list[tuple[str, tuple[str, ...]]] = []
@@ -191,9 +188,6 @@ def _link(speaker: Speaker, arrived: bool, rng: np.random.Generator) -> str:
     if arrived and rng.random() < 0.25 and (more := SPOKEN.arrived_links[speaker.habit if own else ""]):
         links = more
     return links[int(rng.integers(len(links)))]
-
-
-# Reading back -----------------------------------------------------------------------------------
 
 
 def parse(text: str, lexicon: Lexicon) -> meaning.RouteInstruction:

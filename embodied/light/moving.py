@@ -170,8 +170,6 @@ class MovingHouse:
             groups.pop(BODIES, None)
         return SceneChange(self._corners(), (*self._own_patches(), *self.pages.changed(groups, slack)))
 
-    # ------------------------------------------------------------------ things
-
     def _bend(self, moment: Moment, slack: float) -> None:
         """Bring people into their poses, and their light along where their skin has moved by more than `slack`."""
         for name, figure in moment.people.items():
@@ -311,8 +309,6 @@ class MovingHouse:
                 is_body = self._things[name].rest is None and name not in self._skins
                 groups.setdefault(BODIES if is_body else name, []).append(placed)
         return groups
-
-    # ------------------------------------------------------------------ what is drawn
 
     @functools.cached_property
     def lit(self) -> LitPages:

@@ -113,8 +113,6 @@ class Simulator:
         self._motion: DiscreteViews | None = None  # until `initialize`
         self._drawn: dict[tuple[int, bool], np.ndarray] = {}
 
-    # Settings -----------------------------------------------------------------------------------
-
     setDatasetPath = _setting("_dataset_path", str)
     """Folder of `<scan>/matterport_skybox_images`."""
     setNavGraphPath = _setting("_graph_path", str)
@@ -146,8 +144,6 @@ class Simulator:
         """True where the limits lie within a right angle on either side of the horizon; discretized elevations have
         their own."""
         return -math.pi / 2 < float(low) < 0.0 < float(high) < math.pi / 2
-
-    # Play ---------------------------------------------------------------------------------------
 
     def initialize(self) -> None:
         """Read the graphs.
@@ -228,8 +224,6 @@ class Simulator:
         """Forget the episode and the pictures; settings may be changed again."""
         self._ready = False
         self._forget()
-
-    # ---------------------------------------------------------------------------------------------
 
     @property
     def _moving(self) -> DiscreteViews:

@@ -91,9 +91,6 @@ def onward(o: Observation, s: Situation, trail: EpisodeMemory, rng: np.random.Ge
     return Move(int(rng.choice(np.flatnonzero(visits == visits.min()))))
 
 
-# Rules ------------------------------------------------------------------------------------------
-
-
 def never(o: Observation, thing: Detection | None, trail: EpisodeMemory) -> Action | None:
     """Stops at the first thing that looks like it."""
     return Stop() if thing and thing.score >= LIKELY else None

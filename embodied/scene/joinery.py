@@ -110,9 +110,6 @@ def _part(hole: _Hole, piece: str, kind: str, finish: Finish, *shapes: Shape, ta
     return Part(owner, kind, hole.opening.rooms[0], part(finish, hole.world(joined(*shapes))), owner + tag)
 
 
-# ------------------------------------------------------------------ the hole's own surfaces
-
-
 def _tunnel(hole: _Hole, y0: float, y1: float, floor: bool) -> Shape:
     """Jambs and head (and the floor of the hole) from depth y0 to y1, looking into the hole."""
     w, z0, z1 = hole.length, hole.opening.sill, hole.opening.head
@@ -141,9 +138,6 @@ def _threshold(house: House, hole: _Hole, y0: float, y1: float, finish: Callable
         bar = box([lining, y1 - 0.028, -0.001], [hole.length - lining, y1 - 0.002, 0.0035], 0.0015)
         parts.append(Part(owner, "floor", first.id, part(FITTING_METAL, hole.world(bar)), owner + "#bar"))
     return parts
-
-
-# ------------------------------------------------------------------ windows
 
 
 def _window(house: House, hole: _Hole, finish: Callable[[str], Finish], apart: bool) -> list[Part]:
@@ -228,9 +222,6 @@ def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tu
         sashes.append((boards, [pane], handles))
     posts = [box([x - 0.02, y0, z0], [x + 0.02, y1, z1]) for x in cells[2:-1:2]]
     return [*frame(0, w, z0, z1, (y0, y1), outer), *posts], sashes
-
-
-# ------------------------------------------------------------------ doors
 
 
 def _door(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[Part]:

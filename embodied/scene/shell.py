@@ -89,9 +89,6 @@ def _part(owner: str, kind: str, room: Room, finish: Finish, shape: Shape) -> Pa
     return Part(owner, kind, room.id, part(finish, shape), owner)
 
 
-# ------------------------------------------------------------------ walls
-
-
 def holes_of(house: House, room: Room, p: np.ndarray, q: np.ndarray, casings: bool = False) -> list[Hole]:
     """The holes in the wall face from p to q of `room`, sorted; with the casings around them, clipped to the wall."""
     z, length = house.storey_of(room).elevation, float(np.linalg.norm(q - p))

@@ -98,9 +98,6 @@ def _part_of(text: str, *, seed: int) -> str:
     return "validation" if at < HELD_OUT else "test" if at < 2 * HELD_OUT else "train"
 
 
-# What is looked for -------------------------------------------------------------------------------
-
-
 def _said(part: str, key: str, **slots: str) -> list[str]:
     """The phrases of a part of phrases.toml for a key, or else those for all others, with their slots filled."""
     forms = PHRASES[part]
@@ -136,9 +133,6 @@ def _phrases(block: str, one: bool) -> list[str]:
     return _pair(block, one) if len(block) == 2 else _noun(block, 1, one)
 
 
-# What is done to it -------------------------------------------------------------------------------
-
-
 def _done(replacement: str, what: str, *forms: str) -> list[str]:
     """Sayings that `what` becomes a replacement: as imperatives ('operations'), as phrases ('passives')."""
     return [text for form in forms for text in _said(form, replacement, what=what, new=_new(replacement))]
@@ -146,9 +140,6 @@ def _done(replacement: str, what: str, *forms: str) -> list[str]:
 
 def _new(replacement: str) -> str:
     return "[{a1} {a2}]" if replacement.count(LETTER) == 2 else "[{a1}]"
-
-
-# Whole requests -----------------------------------------------------------------------------------
 
 
 def _sayings(shape: RuleShape) -> Iterator[str]:

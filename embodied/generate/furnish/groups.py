@@ -51,9 +51,6 @@ def at_round(values: Sequence[float], k: int, default: float) -> float:
     return values[min(k, len(values) - 1)] if values else default
 
 
-# Which models --------------------------------------------------------------------------------------
-
-
 def _choose(ctx: Context, group: FurnitureGroup, k: int, first: Asset | None) -> list[tuple[GroupPart, Asset]]:
     """The parts of a group that it has in round `k`, each with a model; none where one lacks that it must have."""
     chosen: list[tuple[GroupPart, Asset]] = []
@@ -100,9 +97,6 @@ def _model(ctx: Context, part: GroupPart, k: int, of: Asset | None) -> Asset | N
         if asset is not None:
             return asset
     return None
-
-
-# Where each part stands in the group ---------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -331,9 +325,6 @@ def sides(floor: shapely.Polygon) -> tuple[float, float]:
     """Longer and shorter side of a floor, metres."""
     x0, y0, x1, y1 = floor.bounds
     return max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0)
-
-
-# Which poses are tried -----------------------------------------------------------------------------
 
 
 def _distances(

@@ -49,9 +49,6 @@ def ask_environments(
     return lambda: AskEnv(worlds, answering, moves, rules, describer)
 
 
-# Metrics ----------------------------------------------------------------------------------------
-
-
 def price(episode: Episode, graph: NavGraph) -> float:
     """Price of the questions."""
     return float(sum(s.cost for s in episode.steps))
@@ -71,8 +68,6 @@ def success_progress(episode: Episode, graph: NavGraph) -> float:
     kept = sum(episode.requests <= limit for limit in QUESTION_LIMITS)
     return success(episode, graph) * kept / len(QUESTION_LIMITS)
 
-
-# Its part of an observation ---------------------------------------------------------------------
 
 DETECTIONS = 16
 """Most detections that are shown; the best."""

@@ -24,9 +24,6 @@ UNSEEN = "main_unseen"
 """The whole pool, of a house where nothing is held out."""
 
 
-# Tasks ------------------------------------------------------------------------------------------
-
-
 LIMITS = FindConfig("hari", reach=2.5, fewest_nodes=5, most_nodes=10, horizon=30)
 """Limits of 4.3.5 and Table E.2; success is to end exactly at the intended node."""
 PRETRAINING = dataclasses.replace(LIMITS, fewest_nodes=1)
@@ -149,9 +146,6 @@ def room_part(world: Place, room: str, *, seed: int) -> str | None:
     return {rooms[order[0]]: "val", rooms[order[1]]: "test"}.get(room)
 
 
-# Data sets --------------------------------------------------------------------------------------
-
-
 def splits(sizes: SplitSizes) -> Splits:
     third = sizes.each or max(1, sizes.unseen // 3)
     unseen = sizes.each or sizes.unseen
@@ -184,9 +178,6 @@ TABLE_E_1 = Splits(
 seen conditions draw from all 54."""
 
 
-# Play -------------------------------------------------------------------------------------------
-
-
 def environments(inputs: task_kind.EnvInputs) -> task_kind.EnvMaker:
     rules: HariRules = inputs.rules
     houses = inputs.worlds.values() if inputs.training is None else inputs.training()
@@ -201,8 +192,6 @@ def fitted(task: Task, world: Place, rules: HariRules) -> Task:
     """The task with the horizon of the rules."""
     return task if rules.horizon is None else dataclasses.replace(task, horizon=rules.horizon)
 
-
-# Its part of an observation ---------------------------------------------------------------------
 
 FEWEST_GOALS = 3
 """Rows for goals, or more where the rules stack more."""
