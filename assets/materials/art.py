@@ -1,4 +1,4 @@
-"""Pictures and patterns that are used once, not tiled: wall art, rugs (from above, u along their length), dials, covers."""
+"""Pictures and patterns that are used once, not tiled: wall art, rugs (u along their length), dials, covers."""
 
 from collections.abc import Callable
 
