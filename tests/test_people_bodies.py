@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -63,3 +67,16 @@ def test_a_gaze_turns_the_eyes_before_the_head():
 def test_an_unknown_joint_is_refused():
     with pytest.raises(ValueError, match="unknown joints"):
         Pose({"tail": (0.0, 0.0, 0.0)})
+
+
+def test_posed_bodies_have_the_same_bytes_with_any_number_of_threads():
+    code = (
+        "from hashlib import md5\n"
+        "from embodied.assets.people import POSES, people, posed\n"
+        "parts = [p for who in people().values() for p in posed(who, POSES['waiting'])]\n"
+        "print(md5(b''.join(p.vertices.tobytes() for p in parts)).hexdigest())"
+    )
+    run = lambda n: subprocess.check_output(
+        [sys.executable, "-c", code], env={**os.environ, "OPENBLAS_NUM_THREADS": n, "OMP_NUM_THREADS": n}
+    )
+    assert run("1") == run("2")

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from embodied.assets import materials
 from embodied.assets.built.parametric import FinishOf
@@ -88,8 +89,8 @@ class _Mesh:
     """(n, 4) float32 homogeneous, metres."""
     normals: np.ndarray
     """(n, 3) float32."""
-    weights: np.ndarray
-    """(n, joints) float32, sums 1."""
+    weights: csr_array
+    """(n, joints) float32, sums 1; sparse, so that a product has the same bits with any number of threads."""
     parts: tuple[tuple[str, slice, np.ndarray, np.ndarray], ...]
     """Name, range of vertices, faces within it, uv."""
 
@@ -217,4 +218,4 @@ def mesh_of(name: str, detail: int) -> _Mesh:
         start, first = end, span.stop
     rows = np.concatenate(kept)
     whole = np.column_stack([vertices, np.ones(len(vertices), np.float32)])
-    return _Mesh(whole[rows], normals[rows], weights[rows], tuple(parts))
+    return _Mesh(whole[rows], normals[rows], csr_array(weights[rows]), tuple(parts))
