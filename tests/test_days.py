@@ -34,8 +34,8 @@ def spots(lives, time):
     return {name: piece.spot for name, piece in lives.now(time).items()}
 
 
-def floor_of(house, moment):
-    """Where feet may be while doors are as they are; the way out of the front door is floor, too."""
+def floor_of(house, moment, z=0.0):
+    """Where feet at height z may be while doors are as they are; the way out of the front door is floor, too."""
     now = dataclasses.replace(house, openings=Moment(openness=moment.openness).applied(house).openings)
     fronts = [o for o in now.openings if o.kind == "front_door"]
     out = []
@@ -43,7 +43,13 @@ def floor_of(house, moment):
         middle, into = (np.array(o.a) + o.b) / 2, inward(house, o)
         line, wide = shapely.LineString([middle + 0.4 * into, middle - into]), np.linalg.norm(np.subtract(o.a, o.b))
         out.append(line.buffer(wide / 2 - 0.03, cap_style="flat"))
-    return shapely.union_all([free_floor(now, 0), *out]).difference(
+    out += [free_floor(now, k) for k, s in enumerate(house.storeys) if abs(s.elevation - z) < 0.5]
+    for s in house.stairs:
+        line = shapely.get_coordinates(shapely.segmentize(shapely.LineString(s.path), 0.1), include_z=True)
+        here = line[np.abs(line[:, 2] - z) < 0.5]
+        if len(here) > 1:
+            out.append(shapely.LineString(here[:, :2]).buffer(s.width / 2, cap_style="square", join_style="mitre"))
+    return shapely.union_all(out).difference(
         shapely.union_all([leaf for o in fronts if moment.openness.get(o.id) for leaf in leaves(now, o)])
     )
 
