@@ -373,6 +373,7 @@ def test_whoever_drives_moves_to_a_viewpoint_when_it_is_the_nearest(data):
         off = wrap(math.atan2(dy, dx) - game.drive.yaw)
         play.play("ann", "moved", candidate=0 if abs(off) < 0.2 else 1 if off > 0 else 2)
         assert play.screen("ann")["live"] != before["live"], "there is a picture of every moment"
+        assert play.screen("bob")["live"] is None, "who helps looks around"
         if game.env.pose.node != first:
             break
     with pytest.raises(ActionError, match="3 actions"):
@@ -386,7 +387,7 @@ def test_whoever_drives_moves_to_a_viewpoint_when_it_is_the_nearest(data):
         set_table(StudyPart("p", assistant="simulated", moves="drive"), data)
 
 
-def test_who_is_steered_walks_where_the_body_is_and_stands_when_it_turns(data):
+def test_who_is_steered_walks_where_the_body_is_in_lit_pictures_and_stands_when_it_turns(data, tmp_path):
     play = Script(data, TOGETHER + 'moves = "drive"\nfigure = "mei"\n', ("ann", "bob"))
     drive, shown = play.game("ann").drive, []
     for action in (1, 0, 0, 1):
@@ -396,11 +397,16 @@ def test_who_is_steered_walks_where_the_body_is_and_stands_when_it_turns(data):
         assert math.dist(figure.place.position[:2], drive.position) < 0.02 and to[2] < -1
         assert math.hypot(*to[:2]) > 0.5 and math.isclose(math.atan2(to[1], to[0]), yaw, abs_tol=0.05)
         shown.append(figure.pose)
+        assert play.screen("bob")["live"] == play.screen("ann")["live"]
     alike = lambda a, b: all(np.allclose(a.joints[n], b.joints[n], atol=1e-6) for n in a.joints)
     first, *walking, last = shown
     assert alike(first, last) and not alike(*walking) and not alike(walking[1], last)
     with pytest.raises(ValueError, match="mei"):
         StudyPart("p", figure="nobody", moves="drive")
+    study = write_study(data.folder.parent, TOGETHER + 'moves = "drive"\nfigure = "mei"\n', name="unlit")
+    with pytest.raises(StudyError, match="'together': figure = 'mei' needs lit pictures"):
+        open_study(study, tmp_path / "out", lambda data, name: pytest.fail("nothing is drawn"))
+    assert not (tmp_path / "out").exists()
 
 
 async def fetched(app, path):

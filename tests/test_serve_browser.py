@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import re
 import shutil
+import urllib.request
 
 import cv2
 import numpy as np
 import pytest
-from hand_serve import Served, gradient, make_data, write_study
+from conftest import two_rooms
+from hand_data import built
+from hand_serve import HEAD, Served, gradient, make_data, write_study
+from handmade import furnished
 from test_moving_parts import HOUSE
 
 from embodied.envs.base import HelpEnv
+from embodied.envs.continuous import NavMeshCache
 from embodied.evaluation.evaluate import play
+from embodied.geometry import wrap
 from embodied.interface import Episode
 from embodied.navigation.graph import build_graph
 from embodied.policies.baselines import Forward10
 from embodied.records import load_lines, save_lines
+from embodied.serve.driving import BrowserBody
 from embodied.serve.results import Judgement
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -84,8 +92,8 @@ class Someone:
         self.context.close()
 
 
-@pytest.fixture
-def two(browser, server):
+@contextlib.contextmanager
+def pair(browser, server):
     agent, helper = Someone(browser, server), None
     agent.sees("Waiting for a partner")
     helper = Someone(browser, server)
@@ -94,6 +102,12 @@ def two(browser, server):
     yield agent, helper
     for one in (agent, helper):
         one.close()
+
+
+@pytest.fixture
+def two(browser, server):
+    with pair(browser, server) as both:
+        yield both
 
 
 def test_two_browsers_play_to_the_end_through_a_reload_and_a_dead_server(two, server):
@@ -277,3 +291,62 @@ def test_furniture_is_opened_by_a_key_closed_by_a_button_and_seen_open(browser, 
         one.close()
     finally:
         served.stop()
+
+
+def rooms_with_mugs(seed, name, config, catalogue):
+    """Two rooms joined by a door, with mugs as large as furniture."""
+    things = [dataclasses.replace(p, asset="built/mug_black") for p in furnished(two_rooms()).placements]
+    house = dataclasses.replace(two_rooms(), name=name, placements=tuple(things))
+    return house, build_graph(house)
+
+
+def steered(place, start):
+    """Keys that lead from a viewpoint into the other room."""
+    grounds, graph = NavMeshCache(), place.graph
+    body, ground, rooms = BrowserBody(place, start, grounds), grounds.of(place.house), graph.room_of_node
+    goal = next(n for n, room in enumerate(rooms) if room != rooms[start.node])
+    way = ground.ways(np.array([ground.cell_at(graph.positions[goal, :2])]))
+    here = start.node
+    while rooms[here] == rooms[start.node]:
+        dx, dy = ground.xy[[*way.cells(ground.cell_at(body.position))[:6]][-1]] - body.position
+        off = wrap(math.atan2(dy, dx) - body.yaw)
+        action = 0 if abs(off) < 0.2 else 1 if off > 0 else 2
+        here = body.act(action)
+        yield ("ArrowUp", "ArrowLeft", "ArrowRight")[action]
+
+
+def test_both_sides_see_who_is_steered_through_a_door_through_a_reload_and_a_dead_server(browser, tmp_path):
+    data = built(tmp_path / "data", "vln", make_house=rooms_with_mugs)
+    steers = PARTS + 'split = "val_unseen"\nmoves = "drive"\nfigure = "anna"\n'
+    served = Served(write_study(tmp_path, steers, HEAD + 'pictures = "fast-matte"\n'))
+    with contextlib.ExitStack() as stack:
+        stack.callback(served.stop)
+        agent, helper = stack.enter_context(pair(browser, served))
+        task, shown = next(t for t in data.tasks("val_unseen") if t.id == served.begun()[-1]["task"]), []
+        place, (live, theirs) = data.place(task.world), (one.page.locator("img.live") for one in (agent, helper))
+        for k, key in enumerate(steered(place, task.start)):
+            if k == 4:
+                agent.page.reload()
+                playwright.expect(live).to_have_attribute("src", shown[-1], timeout=600_000)
+            if k == 8:
+                picture = fetched(shown[-1])
+                served.kill()
+                served.start()
+                assert np.abs(fetched(shown[-1]).astype(int) - picture).mean() < 1, "where she was is in the log"
+            before = live.get_attribute("src")
+            agent.page.keyboard.press(key)
+            playwright.expect(live).not_to_have_attribute("src", before, timeout=600_000)
+            shown.append(live.get_attribute("src"))
+            playwright.expect(theirs).to_have_attribute("src", shown[-1], timeout=600_000)
+            blue, green, red = fetched(shown[-1])[40:200, 80:240].astype(int).transpose(2, 0, 1)
+            assert np.mean((blue > red + 12) & (blue < 110)) > 0.01, "her jumper is navy"
+        agent.press("I am there: stop here")
+        helper.sees("Ready for the next one?")
+        (episode,) = load_lines(served.people / "episodes_val_unseen_together.jsonl", Episode)
+        rooms = [place.graph.room_of_node[p.node] for p in (task.start, episode.steps[-1].next_pose)]
+        assert len(set(rooms)) == 2 < len(shown) / 4
+
+
+def fetched(address):
+    """A picture, BGR."""
+    return cv2.imdecode(np.frombuffer(urllib.request.urlopen(address).read(), np.uint8), cv2.IMREAD_COLOR)

@@ -22,7 +22,7 @@ from embodied.agents.language_models.client import WithModel, client_of
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.errors import UnableError
 from embodied.options import Count, Option, OutputFolder, any_path, whole
-from embodied.render.pictures import Baked, PictureSettings, Traced, matte, parse_pictures
+from embodied.render.pictures import PictureSettings, Traced, parse_pictures
 from embodied.serve.study import page_address
 from embodied.software import DISTRIBUTION
 
@@ -126,9 +126,10 @@ def drawn(data: Dataset, name: str, study: Study, args: PeopleStudyOptions) -> P
 
 
 def live_world(data: Dataset, name: str, study: Study, args: PeopleStudyOptions) -> World:
-    """A house to be drawn for people who drive: as its panoramas are, as far as that is quick."""
-    pictures = data.drawn_pictures(name) or parse_pictures(study.pictures, study.size)
-    return world_of(data, name, Baked("fast", gloss=False) if isinstance(pictures, Traced) else matte(pictures), args)
+    """A house to be drawn for people who drive."""
+    from embodied.serve.run import live_pictures
+
+    return world_of(data, name, live_pictures(study, data, name), args)
 
 
 def world_of(data: Dataset, name: str, pictures: PictureSettings, args: PeopleStudyOptions) -> World:

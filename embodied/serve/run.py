@@ -13,6 +13,7 @@ from embodied.datasets.store import Dataset
 from embodied.interface import Episode
 from embodied.records import load_lines, to_json
 from embodied.render.panorama_file import PanoramaFile
+from embodied.render.pictures import Baked, PictureSettings, Traced, matte, parse_pictures
 from embodied.serve.app import Server, key_of
 from embodied.serve.driving import BrowserBody, EncodedPanoramas, Live
 from embodied.serve.game import POLICIES, AgentMaker, AssistantMaker, set_table
@@ -74,8 +75,15 @@ def open_study(
     path = Path(path)
     study, data_path = load_study(path), path.parent
     data = Dataset(data_path / study.data)
-    folder.mkdir(parents=True, exist_ok=True)
     tables = {p.name: set_table(p, data, agents, assistants) for p in study.parts if p.kind == "play"}
+    for table in (t for t in tables.values() if t.part.figure):
+        for house in sorted({t.world for t in (table.practice, *table.tasks.values())}):
+            if live_pictures(study, data, house).quality is None:
+                raise StudyError(
+                    f"{path}: part {table.part.name!r}: figure = {table.part.figure!r} needs lit pictures, and those of "
+                    f"{house} are unlit; take a data set with --pictures fast, or one with none and pictures = 'fast'"
+                )
+    folder.mkdir(parents=True, exist_ok=True)
     viewed = {p.name: tuple(load_lines(data_path / p.episodes, Episode)) for p in study.parts if p.episodes}
     worlds = {w for t in tables.values() for w in t.places} | {e.task.world for v in viewed.values() for e in v}
     for world in sorted(worlds):
@@ -105,6 +113,12 @@ def open_study(
     sessions.finished, sessions.judged = writer.game, writer.judged
     pictures = EncodedPanoramas(files, secret, open_world and functools.partial(open_world, data))
     return Opened(study, folder, Server(sessions, store, pictures, secret, addresses, live))
+
+
+def live_pictures(study: Study, data: Dataset, house: str) -> PictureSettings:
+    """How a house is drawn for people who drive: as its panoramas are, as far as that is quick."""
+    pictures = data.drawn_pictures(house) or parse_pictures(study.pictures, study.size)
+    return Baked("fast", gloss=False) if isinstance(pictures, Traced) else matte(pictures)
 
 
 def serve(opened: Opened, host: str, port: int) -> None:

@@ -73,7 +73,8 @@ def game_of(game: Game, role: str, pictures: EncodedPanoramas) -> Screen:
     play = {"game": game.id, "turn": game.turn, "practice": game.practice, "yours": game.mover == role}
     words = {"advice": game.table.part.advice, "request": request, "said": conversation, "question": game.question}
     seen = {"pano": pictures.name(game.env.seen_from(pose.node), pose.node), "yaw": pose.yaw, "pitch": pose.pitch}
-    return {"screen": role, **play, **words, **seen}
+    sees = game.drive is not None and (role == "agent" or game.table.part.figure)
+    return {"screen": role, **play, **words, **seen, "live": live_name(game, pictures) if sees else None}
 
 
 def agent_of(game: Game, pictures: EncodedPanoramas) -> Screen:
@@ -82,10 +83,9 @@ def agent_of(game: Game, pictures: EncodedPanoramas) -> Screen:
     assert seen is not None
     aim = None if seen.target is None else viewpoint(seen.target)
     target = None if aim is None else pictures.name(aim.world, aim.node)
-    drives = {"live": live_name(game, pictures), "moves": [{"candidate": k} for k in range(len(ACTIONS))]}
-    moves = {"live": None, "moves": moves_of(seen, game, pictures)}
+    drives = [{"candidate": k} for k in range(len(ACTIONS))]
     return {
-        **(moves if game.drive is None else drives),
+        "moves": moves_of(seen, game, pictures) if game.drive is None else drives,
         "doors": doors_of(seen, game.situation),
         "words": list(seen.candidates.words if game.drive is None else ACTIONS),
         "instruction": detokenized(seen.instruction),
@@ -101,7 +101,7 @@ def agent_of(game: Game, pictures: EncodedPanoramas) -> Screen:
 
 
 def live_name(game: Game, pictures: EncodedPanoramas) -> str:
-    """Under which the browser of whoever drives gets what is seen now; others cannot guess it."""
+    """Under which browsers get what is seen now, of whoever drives, or of who is steered; others cannot guess it."""
     return f"{game.id}/{pictures.name(game.id, game.turn)}"
 
 

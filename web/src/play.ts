@@ -85,6 +85,31 @@ function card(title: string, ...children: (Node | string | null | false)[]): HTM
   return h("section", { class: "card" }, h("h2", {}, title), ...children);
 }
 
+/** A picture of this moment. */
+class LivePicture {
+  readonly root = h("img", { class: "live", alt: "What is seen now", hidden: true });
+  private name: string | null = null;
+
+  /** Shows a live picture, then calls `seen`; says so where that takes long. */
+  async show(name: string, seen?: () => void): Promise<void> {
+    if (this.name === name) return;
+    const [next, begun] = [new Image(), performance.now()];
+    next.src = `live/${name}.jpg`;
+    this.name = name;
+    try {
+      await next.decode();
+      if (this.name !== name) return;
+      this.root.src = next.src;
+      const took = performance.now() - begun;
+      if (took > SLOW && seen) say(`Each picture takes ${(took / 1000).toFixed(1)} s: the server is slow. Press a key, then wait.`);
+    } catch {
+      if (this.name !== name) return;
+      this.name = null; // so that the next update tries again
+    }
+    seen?.();
+  }
+}
+
 /** Directions of the ways round the agent, as a small compass. */
 function compass(ways: Way[], view: Panorama): SVGElement {
   const turn = (a: number): string => `rotate(${(-(a - view.yaw) * 180) / Math.PI})`;
@@ -104,7 +129,7 @@ export class AgentView implements View<AgentScreen> {
   private going = false;
   private elsewhere: string | null = null;
   private readonly view = new Panorama(() => this.turned());
-  private readonly live = h("img", { class: "live", alt: "What you see", hidden: true });
+  private readonly live = new LivePicture();
   private readonly corner = h("div", { class: "corner top" });
   private readonly banner = h("div", { class: "banner", role: "status" });
   private readonly keys = h("p", { class: "keys-hint" });
@@ -120,7 +145,7 @@ export class AgentView implements View<AgentScreen> {
     this.root = h(
       "div",
       { class: "play" },
-      h("div", { class: "stage" }, this.view.root, this.live, this.banner, this.corner, this.keys),
+      h("div", { class: "stage" }, this.view.root, this.live.root, this.banner, this.corner, this.keys),
       h(
         "div",
         { class: "side" },
@@ -164,28 +189,10 @@ export class AgentView implements View<AgentScreen> {
     const stop = button(screen.subtask ? "I have followed this advice" : "I am there: stop here", () => this.stop(), "primary stop");
     stop.disabled = waiting;
     this.ending.replaceChildren(stop, h("p", { class: "hint" }, `${left} ${left === 1 ? "step" : "steps"} left.`));
-    this.live.hidden = !screen.live || this.elsewhere !== null;
-    if (screen.live) void this.drive(screen.live);
-    if (this.live.hidden) void this.view.show(this.elsewhere ?? screen.pano);
+    this.live.root.hidden = !screen.live || this.elsewhere !== null;
+    if (screen.live) void this.live.show(screen.live, () => (this.going = false));
+    if (this.live.root.hidden) void this.view.show(this.elsewhere ?? screen.pano);
     if (!screen.live) prefetch(screen.moves.map((m) => m.pano));
-  }
-
-  /** Shows a live picture; says so where that takes long. */
-  private async drive(live: string): Promise<void> {
-    if (this.live.dataset.of === live) return;
-    const [next, begun] = [new Image(), performance.now()];
-    next.src = `live/${live}.jpg`;
-    this.live.dataset.of = live;
-    try {
-      await next.decode();
-      if (this.state.live === live) this.live.src = next.src;
-      const took = performance.now() - begun;
-      if (took > SLOW) say(`Each picture takes ${(took / 1000).toFixed(1)} s: the server is slow. Press a key, then wait.`);
-    } catch {
-      if (this.state.live === live) delete this.live.dataset.of; // so that the next update tries again
-    } finally {
-      if (this.state.live === live) this.going = false;
-    }
   }
 
   private key(e: KeyboardEvent): void {
@@ -286,6 +293,8 @@ export class AssistantView implements View<AssistantScreen> {
   private looking = -1;
   private answered = true;
   private readonly view = new Panorama();
+  private readonly live = new LivePicture();
+  private readonly keys = h("p", { class: "keys-hint" });
   private readonly banner = h("div", { class: "banner", role: "status" });
   private readonly corner = h("div", { class: "corner" });
   private readonly map = h("div", { class: "map" }, h("p", { class: "hint" }, "Loading the plan …"));
@@ -298,7 +307,7 @@ export class AssistantView implements View<AssistantScreen> {
     this.root = h(
       "div",
       { class: "play assist" },
-      h("div", { class: "stage" }, this.view.root, this.banner, this.corner, h("p", { class: "keys-hint" }, LOOK)),
+      h("div", { class: "stage" }, this.view.root, this.live.root, this.banner, this.corner, this.keys),
       h(
         "div",
         { class: "side" },
@@ -348,7 +357,10 @@ export class AssistantView implements View<AssistantScreen> {
   private draw(): void {
     const away = this.looking !== this.node;
     const pano = away && this.house ? this.house.panos[this.looking]! : this.state.pano;
-    void this.view.show(pano);
+    this.live.root.hidden = !this.state.live || away;
+    if (this.state.live) void this.live.show(this.state.live);
+    if (this.live.root.hidden) void this.view.show(pano);
+    this.keys.textContent = this.live.root.hidden ? LOOK : "";
     this.plan?.update(this.state, this.looking);
     this.corner.replaceChildren(...(away ? [button("Back to the agent", () => this.visit(this.node), "primary")] : []));
     this.attach.replaceChildren(

@@ -32,6 +32,7 @@ export interface Game extends Base {
   yaw: number;
   pitch: number;
   partnerThere: boolean;
+  live: string | null; // address of what is seen now, of somebody who drives
 }
 
 export interface Way {
@@ -51,7 +52,6 @@ export interface Door {
 
 export interface AgentScreen extends Game {
   screen: "agent";
-  live: string | null; // address of what somebody sees who drives
   moves: Way[];
   doors: Door[];
   words: string[];
