@@ -44,8 +44,9 @@ SLOWEST = 2.0
 """Seconds for a picture from which on a machine is too slow to drive on."""
 LIVE_KEPT = 64
 """Live pictures in memory."""
-BEHIND, DOWN = 2.2, -0.2
-"""Metres of the camera behind who is steered, and radians that it looks up."""
+BEHIND, CLOSE, DOWN = 2.2, 1.4, -0.2
+"""Metres of the camera behind who is steered, and up to which it would rather look from aside or from before; radians
+that it looks up."""
 Eye = tuple[str, float, float, float, float, MovingPerson | None]
 """World, x, y, z of the camera in metres, yaw in radians, and who is steered."""
 
@@ -83,9 +84,10 @@ class BrowserBody:
         x, y, z = self._ground.world(self.position).tolist()
         if self._limbs is None:
             return self._world, x, y, z + BODY.eye, self.yaw, None
-        far = [(math.cos(self.yaw + turn), math.sin(self.yaw + turn)) for turn in (math.pi, 2.4, 3.9, 1.6, 4.7)]
-        back = (self._ground.moved(self.position, self.position + BEHIND * np.array(f), sliding=False) for f in far)
-        at = max(back, key=lambda p: round(math.dist(p, self.position)))
+        sides = [self.yaw + turn for turn in (math.pi, 2.4, 3.9, 1.6, 4.7, 0.8, 5.5, 0.0)]
+        far = (self.position + BEHIND * np.array([math.cos(s), math.sin(s)]) for s in sides)
+        ends = (self._ground.moved(self.position, p, sliding=False) for p in far)
+        at = max(ends, key=lambda p: min(math.dist(p, self.position), CLOSE))
         seen = self._ground.world(at).tolist()
         return self._world, *seen[:2], seen[2] + EYE, math.atan2(y - seen[1], x - seen[0]), self._figure(self._limbs)
 
