@@ -34,7 +34,7 @@ class Skin:
         self._luxels, self._discs = map(weights, (rest.position, rest.discs.position))
         coarse = mesh_of(person, SHADOW_DETAIL)
         corners = np.concatenate([np.arange(len(coarse.vertices))[span][faces] for _, span, faces, _ in coarse.parts])
-        self._still, self._corners = coarse.vertices[corners, :3], coarse.weights[corners]
+        self._still, self._corners = coarse.vertices[corners, :3], coarse.weights[corners.ravel()]
 
     def meshes(self, pose: Pose) -> list[np.ndarray]:
         """(n, 3) float32 vertices of each mesh of the surface in a pose, metres, in the person's frame."""
