@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
 import re
@@ -90,22 +89,21 @@ class Someone:
         self.context.close()
 
 
-@contextlib.contextmanager
 def pair(browser, server):
-    agent, helper = Someone(browser, server), None
+    agent = Someone(browser, server)
     agent.sees("Waiting for a partner")
     helper = Someone(browser, server)
     agent.sees("Your task")
     helper.sees("Watch the agent")
-    yield agent, helper
-    for one in (agent, helper):
-        one.close()
+    return agent, helper
 
 
 @pytest.fixture
 def two(browser, server):
-    with pair(browser, server) as both:
-        yield both
+    both = pair(browser, server)
+    yield both
+    for one in both:
+        one.close()
 
 
 def test_two_browsers_play_to_the_end_through_a_reload_and_a_dead_server(two, server):
@@ -305,35 +303,37 @@ def steered(place, start):
 def test_both_sides_see_who_is_steered_through_a_door_through_a_reload_and_a_dead_server(browser, tmp_path):
     data = built(tmp_path / "data", "vnla", make_house=house_that_opens)
     steers = PARTS + 'split = "val_unseen"\nmoves = "drive"\nfigure = "anna"\n'
-    served = Served(write_study(tmp_path, steers, HEAD + 'pictures = "fast-matte"\n'))
-    with contextlib.ExitStack() as stack:
-        stack.callback(served.stop)
-        agent, helper = stack.enter_context(pair(browser, served))
-        task, shown = next(t for t in data.tasks("val_unseen") if t.id == served.begun()[-1]["task"]), []
+    served, shown = Served(write_study(tmp_path, steers, HEAD + 'pictures = "fast-matte"\n')), []
+    try:
+        agent, helper = pair(browser, served)
+        task = next(t for t in data.tasks("val_unseen") if t.id == served.begun()[-1]["task"])
         place, (live, theirs) = data.place(task.world), (one.page.locator("img.live") for one in (agent, helper))
         for k, key in enumerate(steered(place, task.start)):
+            before, see = live.get_attribute("src"), {"name": "src", "timeout": 600_000}
             if k == 4:
                 agent.page.reload()
-                playwright.expect(live).to_have_attribute("src", shown[-1], timeout=600_000)
+                playwright.expect(live).to_have_attribute(value=before, **see)
             if k == 8:
-                picture = fetched(shown[-1])
+                picture = fetched(before)
                 served.kill()
                 served.start()
-                assert np.abs(fetched(shown[-1]).astype(int) - picture).mean() < 1, "where she was is in the log"
-            before = live.get_attribute("src")
+                assert np.abs(fetched(before) - picture).mean() < 1, "where she was is in the log"
             agent.page.keyboard.press(key)
-            playwright.expect(live).not_to_have_attribute("src", before, timeout=60_000)
+            playwright.expect(live).not_to_have_attribute(value=before, **see)
             shown.append(live.get_attribute("src"))
-            playwright.expect(theirs).to_have_attribute("src", shown[-1], timeout=600_000)
-            blue, green, red = fetched(shown[-1])[40:200, 80:240].astype(int).transpose(2, 0, 1)
+            playwright.expect(theirs).to_have_attribute(value=shown[-1], **see)
+            blue, _, red = fetched(shown[-1])[40:200, 80:240].transpose(2, 0, 1)
             assert np.mean((blue > red + 12) & (blue < 110)) > 0.01, "her jumper is navy"
         agent.press("I am there: stop here")
         helper.sees("Ready for the next one?")
-        (episode,) = load_lines(served.people / "episodes_val_unseen_together.jsonl", Episode)
-        rooms = [place.graph.room_of_node[p.node] for p in (task.start, episode.steps[-1].next_pose)]
-        assert len(set(rooms)) == 2 and len(shown) >= 12
+        agent.close(), helper.close()
+    finally:
+        served.stop()
+    (episode,) = load_lines(served.people / "episodes_val_unseen_together.jsonl", Episode)
+    rooms = {place.graph.room_of_node[p.node] for p in (task.start, episode.steps[-1].next_pose)}
+    assert len(rooms) == 2 and len(shown) > 12
 
 
 def fetched(address):
     """A picture, BGR."""
-    return cv2.imdecode(np.frombuffer(urllib.request.urlopen(address).read(), np.uint8), cv2.IMREAD_COLOR)
+    return cv2.imdecode(np.frombuffer(urllib.request.urlopen(address).read(), np.uint8), 1).astype(int)
