@@ -80,8 +80,8 @@ def open_study(
         for house in sorted({t.world for t in (table.practice, *table.tasks.values())}):
             if live_pictures(study, data, house).quality is None:
                 raise StudyError(
-                    f"{path}: part {table.part.name!r}: figure = {table.part.figure!r} needs lit pictures, and those of "
-                    f"{house} are unlit; take a data set with --pictures fast, or one with none and pictures = 'fast'"
+                    f"{path}: part {table.part.name!r}: figure = {table.part.figure!r} needs lit pictures, but "
+                    f"{house} is drawn unlit; use a data set with --pictures fast, or with none and pictures = 'fast'"
                 )
     folder.mkdir(parents=True, exist_ok=True)
     viewed = {p.name: tuple(load_lines(data_path / p.episodes, Episode)) for p in study.parts if p.episodes}
