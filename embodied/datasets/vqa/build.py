@@ -3,9 +3,8 @@
 import dataclasses
 import itertools
 import math
-import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from embodied.datasets.checks import DatasetError
 from embodied.datasets.vqa.scene import WalkScene, movable
 from embodied.datasets.vqa.scoring import VqaQuestion, less_guessed, narrowed, thinned
 from embodied.datasets.vqa.types import CHANGE, TYPES
-from embodied.datasets.vqa.walks import TURN, Walk, cameras, film, look_around, tour, view_of
+from embodied.datasets.vqa.walks import TURN, Walk, cameras, corners_of, film, fronts_of, look_around, tour, view_of
 from embodied.generate import HouseConfig
 from embodied.generate.people import CLASS, add_people, place_people
 from embodied.house.contents import free_openness, left_open, stocked
@@ -40,8 +39,8 @@ from embodied.world import World
 WALKS, CHANGES, ROOMS, SPARE, WRITERS = 2, 2, 4, 6, 3
 """Walks through a house; its rooms that are visited twice; most rooms of each walk; times as many questions as are
 wanted that are drawn; people who ask."""
-OPENED, OPENED_BY = 6, 0.5
-"""Pieces of furniture that are opened for walks through a house, and how far at least."""
+WIDE, PASSING = (0.6, 0.8), 0.1
+"""Openness of doors and drawers that are opened for walks, at least; metres from them at which the walks pass."""
 CHANGED, MOVED_BY, ABOVE = 2, 1.0, 0.2
 """Most things that are moved or taken away between two visits; how far from where they were, from the camera and from
 each other they are put; how far above the ceiling is what is taken away, metres."""
@@ -107,14 +106,11 @@ def film_house(which: tuple[str, int], config: VqaConfig, folder: Path, cache: P
     house, graph = make_dataset_house(seed, name, settings, catalogue)
     rng, pictures = stream(seed, "vqa", name), parse_pictures(config.pictures)
     house = lived_in(house, graph, catalogue, rng)
-    free = free_openness(house, catalogue)
     with drafts(home.parent) as private, World(house, catalogue, graph, cache, pictures) as world:
         views = {p.id: view_of(world, p) for p in house.placements if p.object_class == CLASS}
-        walks = [tour(house, graph, ROOMS, rng=rng) for _ in range(WALKS)]
-        world.show(
-            Moment(openness=opened(world, free, {graph.room_of_node[n] for _, stops in walks for n in stops}, rng))
-        )
+        free, walks = free_openness(house, catalogue), [tour(house, graph, ROOMS, rng=rng) for _ in range(WALKS)]
         for k, (path, stops) in enumerate(walks):
+            world.show(Moment(openness=opened(world, free, path, k, rng)))
             track, to = [*cameras(graph, path, stops, rng.uniform(-np.pi, np.pi))], private / name / f"walk_{k}"
             track += look_around(track[-1][0], track[-1][1] + TURN)[: rng.integers(12)]  # it ends with any view
             rooms, frames = tuple(graph.room_of_node[n] for n in stops), tuple(film(world, track, to))
@@ -140,14 +136,25 @@ def lived_in(house: House, graph: NavGraph, catalogue: Catalogue, rng: np.random
     return add_people(left_open(untidy, catalogue).applied(house), met, rooms.values())
 
 
-def opened(world: World, free: Mapping[str, float], rooms: Set[str], rng: np.random.Generator) -> dict[str, float]:
-    """How far doors and drawers of a few pieces of furniture in these rooms are open during walks, by name."""
-    shut = {p.id for p in world.house.placements if p.room in rooms and not openness_of(p.params)}
-    wide = [n for n, x in sorted(free.items()) if x > OPENED_BY and n.partition("/")[0] in shut]
-    one_each = {
-        n.partition("/")[0]: n for n in rng.permutation(wide).tolist() if re.search("door|drawer", n.partition("/")[2])
-    }
-    return {n: round(float(rng.uniform(OPENED_BY, free[n])), 3) for n in [*one_each.values()][:OPENED]}
+def opened(
+    world: World, free: Mapping[str, float], path: Sequence[int], first: int, rng: np.random.Generator
+) -> dict[str, float]:
+    """How far doors and drawers are open during a walk along nodes, by name: those of every other thing, from the
+    `first`, where they can open and are in the way of neither another nor the walk; the other things are shut."""
+    graph, rooms, openness = world.graph, {world.graph.room_of_node[n] for n in path}, dict[str, float]()
+    taken = shapely.LineString(graph.positions[[*path, path[-1]], :2]).buffer(PASSING)
+    wide = lambda p: [m for m in fronts_of(p, world.catalogue) if free[f"{p.id}/{m.name}"] > WIDE[0]]
+    things = [(p, fronts) for p in world.house.placements if (fronts := wide(p))]
+    for k, (p, fronts) in enumerate(things, first):
+        if p.room in rooms:
+            openness |= {f"{p.id}/{part}": 0.0 for part in openness_of(p.params)}
+        for m in (fronts[i] for i in rng.permutation(len(fronts)) if k % 2 and p.room in rooms):
+            by = round(float(rng.uniform(WIDE[0], min(WIDE[1], free[f"{p.id}/{m.name}"]))), 3)
+            corners = np.concatenate([corners_of(m, x) for x in (0.0, by / 2, by)])
+            way = shapely.MultiPoint(RigidPose.upright(p.position, p.yaw).points(corners)[:, :2]).convex_hull
+            if not way.intersects(taken):
+                openness[f"{p.id}/{m.name}"], taken = by, taken | way
+    return openness
 
 
 def two_visits(world: World, node: int, to: Path, name: str, rng: np.random.Generator) -> Walk:

@@ -12,12 +12,11 @@ from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import read_toml
 from embodied.assets.people.figures import person_of
 from embodied.datasets.vqa.scoring import VqaQuestion
-from embodied.datasets.vqa.walks import GLIMPSE, OPEN_KINDS, Walk
+from embodied.datasets.vqa.walks import GLIMPSE, Walk
 from embodied.generate.people import CLASS
 from embodied.geometry import wrap
 from embodied.house.contents import STORED
 from embodied.house.house import House, Placement
-from embodied.house.moment import apart
 from embodied.house.shapes import footprint
 from embodied.language import templates
 from embodied.language.clauses import Referent
@@ -55,8 +54,6 @@ class WalkScene:
         self.glimpsed |= {p.id: 0 for p in house.placements if (p.group or "").startswith(STORED)}
         self.movable = movable(house, catalogue)
         self.things = [p for p in house.placements if p.id in self.clear and p.object_class not in UNFIT]
-        fronts = ((p, apart(catalogue.mesh, p)) for p in self.things)
-        self.openable = [p for p, whole in fronts if whole and any(m.kind in OPEN_KINDS for m in whole.moving)]
         kinds = [(r.kind, r.storey) for r in house.rooms]
         self.rooms = {r.id: kind for r, kind in zip(house.rooms, kinds) if kinds.count(kind) == 1}
         self.looked_at = [r for r in dict.fromkeys(walk.rooms) if r in self.rooms]

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 import shapely
 
-from embodied.assets.moving_parts import openness_of
 from embodied.datasets.vqa.scene import ALIKE, ASKING, WalkScene, bearing, direction, gap, middle
 from embodied.datasets.vqa.scoring import OPTIONS, VqaQuestion
 from embodied.datasets.vqa.walks import CLEAR_SHARE
@@ -173,12 +172,13 @@ def carried(shelf: bool) -> QuestionType:
 
 
 def openness(s: WalkScene) -> Asked:
-    wide, ajar = {p.id: openness_of(p.params) for p in s.openable}, {i for f in s.walk.frames for i in f.ajar}
-    for p, name in s.named(TRIES * [p for p in s.openable if p.id in ajar]):
-        wrong = s.named([q for q in s.openable if not wide[q.id]])[: s.rng.integers(1, OPTIONS)]
-        if wrong:
-            about = (p.id, *sorted(q.id for q, _ in wrong))
-            yield s.ask(name, about, [n for _, n in wrong], f"open by {max(wide[p.id].values()):.2f}")
+    """Which of several things is open where the others are shut, and which is shut where they are open."""
+    ajar, shut = ({i for f in s.walk.frames for i in of(f)} for of in (lambda f: f.ajar, lambda f: f.shut))
+    for an, right, others in [("an", ajar, shut), ("no", shut, ajar)] * TRIES:
+        for p, name in s.named([p for p in s.things if p.id in right]):
+            if wrong := s.named([q for q in s.things if q.id in others])[: s.rng.integers(1, OPTIONS)]:
+                about, fact = (p.id, *sorted(q.id for q, _ in wrong)), "open" if right is ajar else "shut"
+                yield s.ask(name, about, [n for _, n in wrong], fact, an=an)
 
 
 def change(s: WalkScene) -> Asked:

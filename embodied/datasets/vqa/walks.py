@@ -1,9 +1,8 @@
 """Walks through a house for questions about it: where the camera goes, and how much of what each frame shows."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
 import cv2
@@ -13,13 +12,13 @@ import shapely
 from embodied.assets.cache import write_bytes
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.decoding import read_picture
-from embodied.assets.moving_parts import openness_of
+from embodied.assets.moving_parts import MovingPart, openness_of
 from embodied.geometry import facing_of, rectangle, wrap
 from embodied.house.house import House, Placement
 from embodied.house.moment import RigidPose, apart
 from embodied.navigation.graph import NavGraph
 from embodied.records import RecordError
-from embodied.render.camera import camera_at
+from embodied.render.camera import FAR_PLANE, camera_at
 from embodied.world import World
 
 LENS = math.radians(-12), math.radians(60), (360, 480)
@@ -32,23 +31,26 @@ and at least WHOLE of the outline of its box shows it. With less than GLIMPSE in
 question is about what lies between."""
 EYES = 0.93
 """Height of people's eyes, of their height as they stand or sit."""
-AJAR, MOSTLY, BESIDES, OVERLAP, OPEN_SHARES, OPEN_KINDS = 0.5, 0.5, 1.3, 0.7, (0.006, 0.35), ("door", "flap", "drawer")
-"""Openness from which a door or drawer stands open; the least share of its outline that shows it; how much of the thing
-is seen for it; the most share of the outline that is where it is when shut; its least and most share of a frame."""
+AJAR, STATE_SHARE, SHUT_SHOWN, FACING, OPEN_KINDS = 0.5, 0.005, 0.7, 0.4, ("door", "flap", "drawer")
+TOLERANCE, BOARDS = 0.01, np.array([-0.02, 0.0, 0.01])
+"""Openness from which a door or drawer stands open. A frame shows that furniture is open if it gives STATE_SHARE of its
+pixels to the door or drawer, and as many to what it had closed; that it is shut, if it shows so many pixels, and this
+share, of all doors and drawers. Metres from a box that still belong to it."""
 Camera = tuple[np.ndarray, float]
 """(3,) position, metres, and yaw, radians."""
 
 
 @dataclass(frozen=True)
 class WalkFrame:
-    """One picture: `shares` of its pixels by placement; `clear` are those that count as seen,
-    `ajar` furniture of which it shows a door or drawer that stands open."""
+    """One picture: `shares` of its pixels by placement; `clear` are those that count as seen, `ajar` and `shut`
+    furniture of which it shows that a door or drawer stands open, or that none does."""
 
     position: tuple[float, float, float]
     yaw: float
     shares: Mapping[str, float]
     clear: tuple[str, ...] = ()
     ajar: tuple[str, ...] = ()
+    shut: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -116,9 +118,9 @@ def view_of(world: World, person: Placement) -> dict[str, float]:
 def film(world: World, track: Sequence[Camera], folder: Path, first: int = 0) -> Iterator[WalkFrame]:
     """Draw frames of a walk into `folder`, from number `first`: NNN.jpg, and NNN.png with instance ids of 16 bits."""
     things = {p.id: p for p in world.moment.applied(world.house).placements}
-    parts, number = [*ajar_parts(things.values(), world.catalogue)], {name: i for i, name in enumerate(world.owners, 1)}
+    fronts = {o: found for o, p in things.items() if (found := fronts_of(p, world.catalogue))}
     for k, (position, yaw) in enumerate(track, first):
-        view, outlined = world.camera(position, yaw, *LENS), partial(hull, position=position, yaw=yaw)
+        view = world.camera(position, yaw, *LENS)
         pictures = {"jpg": view.rgb[..., ::-1], "png": view.ids.astype(np.uint16)}
         for kind, picture in pictures.items():
             how = [cv2.IMWRITE_JPEG_QUALITY, 88] if kind == "jpg" else []
@@ -127,10 +129,12 @@ def film(world: World, track: Sequence[Camera], folder: Path, first: int = 0) ->
         edge = np.unique(np.concatenate([view.ids[[0, -1]].ravel(), view.ids[:, [0, -1]].ravel()]))
         cut = {world.owners[i - 1] for i in edge.tolist() if 0 < i <= len(things)}
         large = [o for o, share in shares.items() if share >= LARGE or (share >= CLEAR_SHARE and o not in cut)]
-        clear = (o for o in large if shares[o] >= WHOLE * outline(things[o], position, yaw))
+        clear = sorted(o for o in large if shares[o] >= WHOLE * outline(things[o], position, yaw))
+        points, seen = points_of(view.depth, position, yaw), (o for o in fronts if shares.get(o, 0.0) > STATE_SHARE)
+        states = {o: stands_open(things[o], fronts[o], points, position, yaw) for o in seen}
+        ajar, shut = (tuple(o for o, is_open in states.items() if is_open is x) for x in (True, False))
         x, y, z = (round(float(c), 3) for c in position)
-        ajar = (o for o, *boxes in parts if o in shares and shows(view.ids, number[o], *map(outlined, boxes)))
-        yield WalkFrame((x, y, z), round(yaw, 4), shares, tuple(sorted(clear)), tuple(sorted({*ajar})))
+        yield WalkFrame((x, y, z), round(yaw, 4), shares, tuple(clear), ajar, shut)
 
 
 def read_frame(path: Path, mode: int = cv2.IMREAD_COLOR) -> np.ndarray:
@@ -168,23 +172,44 @@ def hull(corners: np.ndarray, position: Sequence[float] | np.ndarray, yaw: float
     return cv2.convexHull(plane.T.astype(np.float32)) if along.min() > 0.05 else np.zeros((1, 1, 2), np.float32)
 
 
-def ajar_parts(things: Iterable[Placement], catalogue: Catalogue) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """Furniture by id with the (8, 3) corners, metres, of each door and drawer that stands open, as it is and shut."""
-    for p in things:
-        whole, openness = apart(catalogue.mesh, p), openness_of(p.params)
-        for m in whole.moving if whole else ():
-            if m.kind in OPEN_KINDS and openness.get(m.name, 0.0) > AJAR:
-                corners, pose = np.array(np.meshgrid(*m.box.T)).reshape(3, -1).T, RigidPose.upright(p.position, p.yaw)
-                is_at = lambda turn, shift, box=corners, pose=pose: pose.points(box @ turn.T + shift)
-                yield p.id, is_at(*m.turn(openness[m.name])), is_at(*m.turn(0.0))
+def fronts_of(p: Placement, catalogue: Catalogue) -> list[MovingPart]:
+    """The doors and drawers of furniture."""
+    whole = apart(catalogue.mesh, p)
+    seen_through = whole is None or "glass" in p.object_class
+    return [] if seen_through else [m for m in whole.moving if m.kind in OPEN_KINDS]
 
 
-def shows(ids: np.ndarray, number: int, outlined: np.ndarray, shut: np.ndarray) -> bool:
-    """True if a frame holds an outline (of `hull`) whole, neither too small nor too large, and most of it shows a thing
-    with this number; and if little enough of it is where the part is when it is shut."""
-    height, width = ids.shape
-    area, both = cv2.contourArea(outlined) / 4, cv2.intersectConvexConvex(outlined, shut)[0] / 4
-    pixels = (outlined[:, 0] * (1, -1) + 1) / 2 * (width, height)
-    inside = cv2.fillConvexPoly(np.zeros(ids.shape, np.uint8), pixels.astype(np.int32), 1) * (ids == number)
-    seen = both < OVERLAP * area and np.abs(outlined).max() < 1 and OPEN_SHARES[0] < area < OPEN_SHARES[1]
-    return bool(seen and inside.mean() > MOSTLY * area and (ids == number).sum() > BESIDES * inside.sum())
+def corners_of(m: MovingPart, openness: float = 0.0) -> np.ndarray:
+    """(8, 3) of the box of a door or drawer that is open so far, metres in the frame of its thing."""
+    turn, shift = m.turn(openness)
+    return np.array(np.meshgrid(*m.box.T)).reshape(3, -1).T @ turn.T + shift
+
+
+def points_of(depth: np.ndarray, position: Sequence[float] | np.ndarray, yaw: float) -> np.ndarray:
+    """(n, 3) what every other pixel of every other row of a frame shows, metres in the world; from its depth."""
+    pitch, vfov, (height, width) = LENS
+    camera, half = camera_at(position, yaw, pitch, vfov), math.tan(vfov / 2)
+    right, up = (half * (2 * np.arange(0.5, n, 2) / n - 1) for n in (width, height))
+    rays = camera.forward + (right * width / height)[:, None] * camera.right - up[:, None, None] * camera.up
+    return (camera.position + np.minimum(depth[::2, ::2, None], FAR_PLANE) * rays).reshape(-1, 3)
+
+
+def stands_open(
+    p: Placement, fronts: Sequence[MovingPart], points: np.ndarray, position: Sequence[float] | np.ndarray, yaw: float
+) -> bool | None:
+    """True if a frame, by its `points_of`, shows that a door or drawer of furniture stands open, False if it shows that
+    none does; None if it shows neither."""
+    pose, wide = RigidPose.upright(p.position, p.yaw), openness_of(p.params)
+    share = lambda at, box, by=TOLERANCE: np.mean(((at > box[0] - by) & (at < box[1] + by)).all(1))
+    local = pose.local(points)
+    for m in fronts:
+        if wide.get(m.name, 0.0) > AJAR:
+            turn, shift = m.turn(wide[m.name])
+            as_shut = (local - shift) @ turn
+            seen_in = share(as_shut, m.inside, BOARDS) if m.slides else share(local, m.inside)
+            if min(share(as_shut, m.box), seen_in) > STATE_SHARE:
+                return True
+    areas = [cv2.contourArea(hull(pose.points(corners_of(m)), position, yaw)) / 4 or math.inf for m in fronts]
+    away = [np.array(m.box.mean(0) - pose.local(np.asarray(position)[None])[0]) for m in fronts]
+    shown = sum(share(local, m.box) for m in fronts) > max(SHUT_SHOWN * sum(areas), STATE_SHARE)
+    return False if shown and not wide and min(d[1] / np.linalg.norm(d) for d in away) > FACING else None
