@@ -16,6 +16,7 @@ from hand_chat import ChatServer, first_allowed
 
 from embodied.agents.vision.answers import strip_of_frames
 from embodied.assets.catalogue import load_catalogue
+from embodied.assets.moving_parts import OPEN
 from embodied.assets.people.figures import person_of
 from embodied.cli import main
 from embodied.datasets.vqa.build import VqaData, asked_about
@@ -33,8 +34,9 @@ from embodied.datasets.vqa.scoring import (
     thinned,
 )
 from embodied.datasets.vqa.types import TYPES
-from embodied.datasets.vqa.walks import CLEAR_SHARE, Walk, WalkFrame, hull, shows
+from embodied.datasets.vqa.walks import CLEAR_SHARE, Walk, WalkFrame, fronts_of, hull, points_of, stands_open
 from embodied.house.house import House, Placement, Storey
+from embodied.house.moment import RigidPose
 from embodied.language.lexicon import ROOM_NOUNS
 from embodied.language.plain_language import plural
 from embodied.navigation.graph import build_graph
@@ -134,13 +136,28 @@ def test_words_that_mislead_are_words_of_things():
     assert {*ASKING["unsaid"]} <= nouns and classes <= {*of.nouns_of}
 
 
-def test_an_open_door_counts_as_seen_where_it_is_in_view_and_not_where_it_is_when_shut():
-    corners, ids = np.array([[3, y, z] for y in (-0.3, 0.3) for z in (0.9, 1.5)], float), np.full((360, 480), 7)
-    seen = lambda owner, at, yaw=0.0, beside=1.0: shows(
-        ids, owner, hull(corners, at, yaw), hull(corners + (0, beside, 0), at, yaw)
-    )
-    assert seen(7, (0, 0, 1.5)) and not seen(8, (0, 0, 1.5)) and not seen(7, (0, 0, 1.5), beside=0.1)
-    assert not any((seen(7, (0, 0, 1.5), math.pi), seen(7, (0, 0, 6)), seen(7, (2.5, 0, 1.5)), seen(7, (-9, 0, 1.5))))
+def test_furniture_is_open_where_its_door_and_its_inside_are_seen_and_shut_where_all_its_front_is():
+    catalogue, rng = load_catalogue(None), np.random.default_rng(0)
+    asset = next(a for a in catalogue.of_class("base cabinet") if a.size[0] < 0.7)
+    shut = Placement("cabinet_1", asset.key, "base cabinet", "kitchen_1", (3.0, 1.0, 0.0), 0.5, asset.size)
+    door = next(m for m in fronts_of(shut, catalogue) if m.kind == "door")
+    pose = RigidPose.upright(shut.position, shut.yaw)
+    wide, (turn, shift) = dataclasses.replace(shut, params=((OPEN + door.name, 0.7),)), door.turn(0.7)
+    front, inside = (box[0] + rng.random((99, 3)) * np.ptp(box, axis=0) for box in (door.box, door.inside))
+    inside[:, 1] = door.inside[1, 1]
+    leaf = front @ turn.T + shift
+
+    def shown(p: Placement, *seen: np.ndarray, side: int = -1) -> bool | None:
+        at = pose.points(np.array([[0.0, 2.0 * side, 1.5]]))[0]
+        return stands_open(p, [door], pose.points(np.concatenate(seen)), at, shut.yaw - side * math.pi / 2)
+
+    assert shown(wide, leaf, inside) is True and shown(shut, front) is False
+    assert {shown(wide, leaf), shown(wide, inside), shown(shut, front, side=1), shown(shut, inside)} == {None}
+
+
+def test_the_points_of_a_frame_fill_it():
+    there = hull(points_of(np.full((360, 480), 2.0), (1.0, 2.0, 1.5), 0.7), (1.0, 2.0, 1.5), 0.7)
+    assert np.abs(there).max() == pytest.approx(1, abs=0.01) and cv2.contourArea(there) == pytest.approx(4, abs=0.05)
 
 
 def test_the_same_seed_asks_the_same(hand):

@@ -200,16 +200,16 @@ def stands_open(
     """True if a frame, by its `points_of`, shows that a door or drawer of furniture stands open, False if it shows that
     none does; None if it shows neither."""
     pose, wide = RigidPose.upright(p.position, p.yaw), openness_of(p.params)
-    share = lambda at, box, by=TOLERANCE: np.mean(((at > box[0] - by) & (at < box[1] + by)).all(1))
+    within = lambda at, box, by=TOLERANCE: ((at > box[0] - by) & (at < box[1] + by)).all(1)
     local = pose.local(points)
     for m in fronts:
         if wide.get(m.name, 0.0) > AJAR:
             turn, shift = m.turn(wide[m.name])
-            as_shut = (local - shift) @ turn
-            seen_in = share(as_shut, m.inside, BOARDS) if m.slides else share(local, m.inside)
-            if min(share(as_shut, m.box), seen_in) > STATE_SHARE:
+            leaf = within(as_shut := (local - shift) @ turn, m.box)
+            behind = within(as_shut, m.inside, BOARDS) if m.slides else within(local, m.inside)
+            if min(leaf.mean(), (behind & ~leaf).mean()) > STATE_SHARE:
                 return True
     areas = [cv2.contourArea(hull(pose.points(corners_of(m)), position, yaw)) / 4 or math.inf for m in fronts]
     away = [np.array(m.box.mean(0) - pose.local(np.asarray(position)[None])[0]) for m in fronts]
-    shown = sum(share(local, m.box) for m in fronts) > max(SHUT_SHOWN * sum(areas), STATE_SHARE)
+    shown = sum(within(local, m.box).mean() for m in fronts) > max(SHUT_SHOWN * sum(areas), STATE_SHARE)
     return False if shown and not wide and min(d[1] / np.linalg.norm(d) for d in away) > FACING else None
