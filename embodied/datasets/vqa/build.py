@@ -40,7 +40,7 @@ WALKS, CHANGES, ROOMS, SPARE, WRITERS = 2, 2, 4, 6, 3
 """Walks through a house; its rooms that are visited twice; most rooms of each walk; times as many questions as are
 wanted that are drawn; people who ask."""
 WIDE, PASSING = (0.6, 0.8), 0.1
-"""Openness of doors and drawers that are opened for walks, at least; metres from them at which the walks pass."""
+"""Openness of doors and drawers that are opened for walks, from and to; metres from them at which the walks pass."""
 CHANGED, MOVED_BY, ABOVE = 2, 1.0, 0.2
 """Most things that are moved or taken away between two visits; how far from where they were, from the camera and from
 each other they are put; how far above the ceiling is what is taken away, metres."""

@@ -32,10 +32,11 @@ question is about what lies between."""
 EYES = 0.93
 """Height of people's eyes, of their height as they stand or sit."""
 AJAR, STATE_SHARE, SHUT_SHOWN, FACING, OPEN_KINDS = 0.5, 0.005, 0.7, 0.4, ("door", "flap", "drawer")
-TOLERANCE, BOARDS = 0.01, np.array([-0.02, 0.0, 0.01])
 """Openness from which a door or drawer stands open. A frame shows that furniture is open if it gives STATE_SHARE of its
-pixels to the door or drawer, and as many to what it had closed; that it is shut, if it shows so many pixels, and this
-share, of all doors and drawers. Metres from a box that still belong to it."""
+pixels to the door or drawer, and as many to what it closes; that it is shut, if it gives so many, and SHUT_SHOWN of their
+outlines, to all doors and drawers, and looks at them from the front: the cosine of the angle to it, at least."""
+TOLERANCE, BOARDS = 0.01, np.array([-0.02, 0.0, 0.01])
+"""Metres from a box that still belong to it, and along x, y and z from the inside of a drawer, without its boards."""
 Camera = tuple[np.ndarray, float]
 """(3,) position, metres, and yaw, radians."""
 
