@@ -33,8 +33,8 @@ EYES = 0.93
 """Height of people's eyes, of their height as they stand or sit."""
 AJAR, STATE_SHARE, SHUT_SHOWN, FACING, OPEN_KINDS = 0.5, 0.005, 0.7, 0.4, ("door", "flap", "drawer")
 """Openness from which a door or drawer stands open. A frame shows that furniture is open if it gives STATE_SHARE of its
-pixels to the door or drawer, and as many to what it closes; that it is shut, if it gives so many to all doors and drawers,
-and SHUT_SHOWN of their outlines, and is seen from the front: the cosine of the angle to it, at least."""
+pixels to the door or drawer, and as many to what it closes; that it is shut, if it gives so many to all doors and
+drawers, and SHUT_SHOWN of their outlines, and is before them: the least cosine between the way and their front."""
 TOLERANCE, BOARDS = 0.01, np.array([-0.02, 0.0, 0.01])
 """Metres from a box that still belong to it, and along x, y and z from the inside of a drawer, without its boards."""
 Camera = tuple[np.ndarray, float]
