@@ -172,13 +172,23 @@ def carried(shelf: bool) -> QuestionType:
 
 
 def openness(s: WalkScene) -> Asked:
-    """Which of several things is open where the others are shut, and which is shut where they are open."""
+    """Which of several things is open where the others are shut, and which is shut where they are open. What has no
+    name of its own is open as one of its kind, and shut if all of them are."""
     ajar, shut = ({i for f in s.walk.frames for i in of(f)} for of in (lambda f: f.ajar, lambda f: f.shut))
+    kinds = {p.object_class: {q.id for q in s.meant(p.object_class)} for p in s.things}
+
+    def named(p: Placement, an: str) -> str | None:
+        kind = kinds[p.object_class]
+        one = an == "an" and len(kind) > 1 and (p.id in ajar or kind <= shut)
+        return s.name(p) or (f"one of the {plural(p.object_class)}" if one else None)
+
     for an, right, others in [("an", ajar, shut), ("no", shut, ajar)] * TRIES:
-        for p, name in s.named([p for p in s.things if p.id in right]):
-            if wrong := s.named([q for q in s.things if q.id in others])[: s.rng.integers(1, OPTIONS)]:
-                about, fact = (p.id, *sorted(q.id for q, _ in wrong)), "open" if right is ajar else "shut"
-                yield s.ask(name, about, [n for _, n in wrong], fact, an=an)
+        for p in s.shuffled([p for p in s.things if p.id in right]):
+            of_name = {name: q.id for q in s.shuffled(s.things) if q.id in others and (name := named(q, an))}
+            wrong = [*of_name][: s.rng.integers(1, OPTIONS)]
+            if wrong and (name := named(p, an)):
+                about = (p.id, *sorted(of_name[n] for n in wrong))
+                yield s.ask(name, about, wrong, "open" if right is ajar else "shut", an=an)
 
 
 def change(s: WalkScene) -> Asked:

@@ -31,10 +31,10 @@ and at least WHOLE of the outline of its box shows it. With less than GLIMPSE in
 question is about what lies between."""
 EYES = 0.93
 """Height of people's eyes, of their height as they stand or sit."""
-AJAR, STATE_SHARE, SHUT_SHOWN, FACING, OPEN_KINDS = 0.5, 0.005, 0.7, 0.4, ("door", "flap", "drawer")
+AJAR, STATE_SHARE, LOOK_IN, SHUT_SHOWN, FACING, OPEN_KINDS = 0.5, 0.005, 0.15, 0.7, 0.4, ("door", "flap", "drawer")
 """Openness from which a door or drawer stands open. A frame shows that furniture is open if it gives STATE_SHARE of its
-pixels to the door or drawer, and as many to what it closes; that it is shut, if it gives so many to all doors and
-drawers, and SHUT_SHOWN of their outlines, and is before them: the least cosine between the way and their front."""
+pixels to the door or drawer, and as many, and LOOK_IN of these, to what it closes; that it is shut, if it gives so many
+to all doors and drawers, and SHUT_SHOWN of their outlines, and is before them: a cosine to their front of FACING."""
 TOLERANCE, BOARDS = 0.01, np.array([-0.02, 0.0, 0.01])
 """Metres from a box that still belong to it, and along x, y and z from the inside of a drawer, without its boards."""
 Camera = tuple[np.ndarray, float]
@@ -208,7 +208,7 @@ def stands_open(
             turn, shift = m.turn(wide[m.name])
             leaf = within(as_shut := (local - shift) @ turn, m.box)
             behind = within(as_shut, m.inside, BOARDS) if m.slides else within(local, m.inside)
-            if min(leaf.mean(), (behind & ~leaf).mean()) > STATE_SHARE:
+            if (behind & ~leaf).mean() > max(STATE_SHARE, LOOK_IN * leaf.mean()) and leaf.mean() > STATE_SHARE:
                 return True
     areas = [cv2.contourArea(hull(pose.points(corners_of(m)), position, yaw)) / 4 or math.inf for m in fronts]
     away = [np.array(m.box.mean(0) - pose.local(np.asarray(position)[None])[0]) for m in fronts]
