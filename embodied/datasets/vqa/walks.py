@@ -131,8 +131,8 @@ def film(world: World, track: Sequence[Camera], folder: Path, first: int = 0) ->
         cut = {world.owners[i - 1] for i in edge.tolist() if 0 < i <= len(things)}
         large = [o for o, share in shares.items() if share >= LARGE or (share >= CLEAR_SHARE and o not in cut)]
         clear = sorted(o for o in large if shares[o] >= WHOLE * outline(things[o], position, yaw))
-        points, seen = points_of(view.depth, position, yaw), (o for o in fronts if shares.get(o, 0.0) > STATE_SHARE)
-        states = {o: stands_open(things[o], fronts[o], points, position, yaw) for o in seen}
+        points = points_of(view.depth, position, yaw)
+        states = {o: stands_open(things[o], fronts[o], points, position, yaw) for o in clear if o in fronts}
         ajar, shut = (tuple(o for o, is_open in states.items() if is_open is x) for x in (True, False))
         x, y, z = (round(float(c), 3) for c in position)
         yield WalkFrame((x, y, z), round(yaw, 4), shares, tuple(clear), ajar, shut)
