@@ -119,7 +119,7 @@ def view_of(world: World, person: Placement) -> dict[str, float]:
 def film(world: World, track: Sequence[Camera], folder: Path, first: int = 0) -> Iterator[WalkFrame]:
     """Draw frames of a walk into `folder`, from number `first`: NNN.jpg, and NNN.png with instance ids of 16 bits."""
     things = {p.id: p for p in world.moment.applied(world.house).placements}
-    fronts = {o: found for o, p in things.items() if (found := fronts_of(p, world.catalogue))}
+    fronts = {o: movable for o, p in things.items() if (movable := fronts_of(p, world.catalogue))}
     for k, (position, yaw) in enumerate(track, first):
         view = world.camera(position, yaw, *LENS)
         pictures = {"jpg": view.rgb[..., ::-1], "png": view.ids.astype(np.uint16)}
