@@ -174,10 +174,9 @@ def hull(corners: np.ndarray, position: Sequence[float] | np.ndarray, yaw: float
 
 
 def fronts_of(p: Placement, catalogue: Catalogue) -> list[MovingPart]:
-    """The doors and drawers of furniture."""
-    whole = apart(catalogue.mesh, p)
-    seen_through = whole is None or "glass" in p.object_class
-    return [] if seen_through else [m for m in whole.moving if m.kind in OPEN_KINDS]
+    """The doors and drawers of furniture; none where they are of glass."""
+    whole = None if "glass" in p.object_class else apart(catalogue.mesh, p)
+    return [m for m in whole.moving if m.kind in OPEN_KINDS] if whole else []
 
 
 def corners_of(m: MovingPart, openness: float = 0.0) -> np.ndarray:
