@@ -115,7 +115,8 @@ def open_front(w: Wearer, gap: float, flare: float = 0.0) -> Field:
     def field(x: Layer) -> np.ndarray:
         p = x.place
         half = gap / 2 + flare * np.maximum(w.joints["neck"][2] - p[:, 2], 0)
-        return np.where((p[:, 1] < w.joints["chest"][1] - 0.02) & (arm_share(x) < 0.5), np.abs(p[:, 0]) - half, 1.0)
+        behind = p[:, 1] - w.joints["chest"][1] + 0.02
+        return np.where(arm_share(x) < 0.5, np.maximum(np.abs(p[:, 0]) - half, behind), 1.0)
 
     return field
 
@@ -313,7 +314,7 @@ def cardigan(
         cloth=0.008,
         ease=0.006,
     )
-    return [("", x, None)]
+    return [("", x, edge)]
 
 
 def trousers(w: Wearer, shell: Shell, length: float = 1.93, width: float = 1.0) -> Made:
@@ -361,10 +362,10 @@ def apron(w: Wearer, shell: Shell, length: float = 0.75, width: float = 1.0) -> 
     made: Made = []
     hip, knee = (w.joints[f"left_{j}"][2] for j in ("thigh", "shin"))
     hem, top = hip + length * (knee - hip), w.joints["chest"][2] + 0.09 * w.scale
-    front = lambda half: lambda y: np.where(y.place[:, 1] < 0.0, half * w.scale - np.abs(y.place[:, 0]), -1.0)
+    front = lambda half: lambda y: np.minimum(half * w.scale - np.abs(y.place[:, 0]), -y.place[:, 1])
     x = subdivided(layer("helper-skirt", w.place))
     x.data[:, 6:8] *= SKIRT_UV * w.scale
-    edge = meet(lambda y: y.place[:, 2] - hem, front(0.2 * width))
+    edge = meet(lambda y: y.place[:, 2] - hem, front(0.15 * width))
     x = clipped(pushed(smoothed(x, 6), shell, 0.008), edge(x))
     made.append(("", hemmed(x, 0.003), None))
     bib = meet(above(_waist(w, 0.04)), below(top), front(0.125 * width))
