@@ -175,12 +175,12 @@ def openness(s: WalkScene) -> Asked:
     """Which of several things is open where the others are shut, and which is shut where they are open. What has no
     name of its own is open as one of its kind, and shut if all of them are."""
     ajar, shut = ({i for f in s.walk.frames for i in of(f)} for of in (lambda f: f.ajar, lambda f: f.shut))
-    kinds = {p.object_class: {q.id for q in s.meant(p.object_class)} for p in s.things}
 
     def named(p: Placement, an: str) -> str | None:
-        kind = kinds[p.object_class]
-        one = an == "an" and len(kind) > 1 and (p.id in ajar or kind <= shut)
-        return s.name(p) or (f"one of the {plural(p.object_class)}" if one else None)
+        alike = s.meant(p.object_class)
+        several = sum(q.object_class == p.object_class for q in alike) > 1
+        tells = an == "an" and (p.id in ajar or {q.id for q in alike} <= shut)
+        return s.name(p) or (f"one of the {plural(p.object_class)}" if several and tells else None)
 
     for an, right, others in [("an", ajar, shut), ("no", shut, ajar)] * TRIES:
         for p in s.shuffled([p for p in s.things if p.id in right]):
