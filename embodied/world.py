@@ -573,13 +573,17 @@ class World:
                 renderer.close()
         self._renderer = self._watcher = self._tracer = self._moving = None
         self._moments = [Moment()]
-        for world in (*self._states.values(), *self.__dict__.pop("_homes", ())):
-            world.close()
-        self._states = {}
+        self.close_states()
         if self._file is not None:
             self._file.close()
             self._file = None
         self._recent.cache_clear()
+
+    def close_states(self) -> None:
+        """Free what draws the house in other states than this: with other doors, or among who lives there."""
+        for world in (*self._states.values(), *self.__dict__.pop("_homes", ())):
+            world.close()
+        self._states = {}
 
     def __enter__(self) -> Self:
         return self

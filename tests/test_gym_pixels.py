@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from unittest.mock import Mock
 
 import gymnasium as gym
 import numpy as np
@@ -17,7 +18,15 @@ from embodied.agents.vision.live import LiveFeatures
 from embodied.envs.base import HelpEnv
 from embodied.gym import sensors as module
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.sensors import FAR, CameraSensor, FeatureSensor, PanoramaStore, SensorSuite, ViewSettings
+from embodied.gym.sensors import (
+    FAR,
+    HOUSES_CHANGED,
+    CameraSensor,
+    FeatureSensor,
+    PanoramaStore,
+    SensorSuite,
+    ViewSettings,
+)
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.gym.vector_env import SharedSyncVectorEnv
 from embodied.interface import Move, Sight, Stop
@@ -169,3 +178,12 @@ def test_a_robots_camera_is_seen_through_and_sees_the_same_again(world):
         assert o["rgb"].shape == (*whole.shape, 3) and o["depth"].shape == whole.shape
     with pytest.raises(ValueError, match="camera 'webcam' is unknown"):
         ViewSettings(camera="webcam")
+
+
+def test_only_the_latest_houses_stay_open_in_other_states():
+    worlds = {f"h{k}": Mock() for k in range(HOUSES_CHANGED + 2)}
+    store = PanoramaStore(worlds)
+    for name in worlds:
+        store.at(Sight(f"{name}|@", 0))
+        store.at(Sight(name, 0))
+    assert [w.close_states.call_count for w in worlds.values()] == [1, 1, *[0] * HOUSES_CHANGED]

@@ -20,7 +20,7 @@ from gymnasium import spaces
 
 from embodied.errors import UnableError
 from embodied.interface import STEP, VIEWS, FeatureSource, Observation, Sight, Viewpoint, viewpoint
-from embodied.navigation.doors import place_named
+from embodied.navigation.doors import MARK, place_named
 from embodied.people.strolls import PERSON_HEIGHT, PERSON_RADIUS, Crowd
 from embodied.render.camera import Camera
 from embodied.render.panorama import VFOV36, Panorama, equirect_grid, grid36, perspective_grid
@@ -36,8 +36,9 @@ LARGE = 1e6
 """Bound of what has no natural one (features, times, word numbers); Gymnasium wants it finite."""
 FAR = 65.535
 """Depth where nothing is, and the largest there is, metres."""
-MEMORY = 512 * 2**20
-"""Bytes of decoded panoramas that are kept."""
+MEMORY, HOUSES_CHANGED = 512 * 2**20, 3
+"""Bytes of decoded panoramas that are kept; houses that are held open with other doors, or with people who live there:
+a lit one takes a gigabyte."""
 ENCODERS = "embodied.encoders"
 """Group of entry points under which encoders of pictures are found; 'default' is the one that ships."""
 
@@ -227,6 +228,7 @@ class PanoramaStore:
     def __init__(self, worlds: Mapping[str, World], budget: int = MEMORY) -> None:
         self._worlds, self._budget = worlds, budget
         self._kept: OrderedDict[Viewpoint, Panorama] = OrderedDict()
+        self._changed = list[str]()
 
     def __reduce__(self) -> tuple[type[PanoramaStore], tuple[Mapping[str, World], int]]:
         """Pickled and copied without the panoramas, whose files are open here."""
@@ -249,6 +251,12 @@ class PanoramaStore:
                 break
             self._kept.popitem(last=False)
             held -= size
+        house, changed, _ = key.world.partition(MARK)
+        if changed:
+            self._changed = [house, *(h for h in self._changed if h != house)]
+            for other in self._changed[HOUSES_CHANGED:]:
+                self._worlds[other].close_states()
+            del self._changed[HOUSES_CHANGED:]
         self._kept[key] = place_named(self._worlds, key.world).panorama(key.node)
         return self._kept[key]
 
