@@ -53,13 +53,15 @@ def agent(kind: str, name: str, worlds: Mapping[str, SeenPlace] | None = None) -
 
 
 def spread(tasks: Sequence[Task], limit: int | None) -> list[Task]:
-    """At most `limit` tasks, taken from all houses alike: every house's first, then every second one, ..."""
+    """At most `limit` tasks, taken from all houses alike, every house's first, then every second one, ...; house by
+    house, so that few are open at a time."""
     by_house: dict[str, list[Task]] = {}
     for t in tasks:
         by_house.setdefault(t.world, []).append(t)
     longest = max(map(len, by_house.values()), default=0)
     order = [ts[i] for i in range(longest) for ts in by_house.values() if i < len(ts)]
-    return order[:limit]
+    chosen = order[:limit]
+    return [t for name in by_house for t in chosen if t.world == name]
 
 
 def with_doors(split: S, share: float, rule: DoorRule, *, seed: int) -> S:
