@@ -32,6 +32,8 @@ ALIKE: Mapping[str, list[str]] = {name: group for group in ASKING["alike"] for n
 EASILY_MOVED = ("chair", "stool", "plant", "basket", "box", "bag", "table", "toy", "horse", "suitcase", "stand", " bin")
 LEAST_MOVED = 0.3
 """Parts of the names of classes of what is moved between two visits, and its longest side at least, metres."""
+FURNITURE, FURNITURE_SHARE, SEEN_THROUGH = 0.5, 0.008, ("transparent", "clear", "coloured", "natural")
+"""Longest side of furniture, metres, and the share of a frame in which it is recognised; words that are no colour."""
 FLOORS = {1: ("",), 2: ("ground", "upper"), 3: ("ground", "middle", "top")}
 """Storeys, by how many there are."""
 
@@ -49,11 +51,15 @@ class WalkScene:
         self.lexicon, self.assets = lexicon_of(catalogue), {p.id: catalogue.assets[p.asset] for p in house.placements}
         self.kind, self.by, self.rng = "", templates.SPEAKERS[0], np.random.default_rng(0)
         self._called: dict[str, list[Placement]] = {}
-        self.clear = _firsts(f.clear for f in walk.frames)
+        self._nouns: dict[str, str] = {}
+        small = {p.id for p in house.placements if max(p.size) < FURNITURE}
+        known = ([o for o in f.clear if o in small or f.shares[o] >= FURNITURE_SHARE] for f in walk.frames)
+        self.clear = _firsts(known)
         self.glimpsed = _firsts([o for o, share in f.shares.items() if share >= GLIMPSE] for f in walk.frames)
         self.glimpsed |= {p.id: 0 for p in house.placements if (p.group or "").startswith(STORED)}
         self.movable = movable(house, catalogue)
         self.things = [p for p in house.placements if p.id in self.clear and p.object_class not in UNFIT]
+        self.things = [p for p in self.things if p.asset not in ASKING["unlike"]]
         kinds = [(r.kind, r.storey) for r in house.rooms]
         self.rooms = {r.id: kind for r, kind in zip(house.rooms, kinds) if kinds.count(kind) == 1}
         self.looked_at = [r for r in dict.fromkeys(walk.rooms) if r in self.rooms]
@@ -62,6 +68,7 @@ class WalkScene:
         """The scene for somebody drawn who asks questions of a type."""
         scene = copy.copy(self)
         scene.kind, scene.rng, scene.by = kind, rng, templates.draw_speaker(rng)
+        scene._nouns = {}
         return scene
 
     def ask(self, answer: str, about: Iterable[str], others: Any = (), fact: str = "", **slots: str) -> VqaQuestion:
@@ -94,7 +101,8 @@ class WalkScene:
         """'kitchen', 'master bedroom', 'bathroom on the upper floor'."""
         (kind, storey), every = self.rooms[room], self.house.rooms
         nouns = ROOM_NOUNS[kind]
-        noun = nouns[0 if self.rng.random() < self.by.plainness else int(self.rng.integers(len(nouns)))]
+        drawn = nouns[0 if self.rng.random() < self.by.plainness else int(self.rng.integers(len(nouns)))]
+        noun = self._nouns.setdefault(kind, drawn)  # one person says one word for it
         floor = FLOORS[len(self.house.storeys)][storey]
         return f"{noun} on the {floor} floor" if sum(r.kind == kind for r in every) > 1 else noun
 
@@ -132,6 +140,8 @@ class WalkScene:
             plain = self.rng.random() < self.by.plainness or word.noun in ASKING["unsaid"]
             if plain or with_article(word.noun).startswith("some "):
                 word = Word(p.object_class, tuple(w for w in word.adjectives if w not in p.object_class.split()))
+            colours = () if p.object_class in ASKING["colourless"] else self.assets[p.id].colours
+            word = Word(word.noun, tuple(w for w in word.adjectives if w in colours and w not in SEEN_THROUGH))
             meant = self.meant(str(word))
             if with_article(word.noun).startswith("some "):
                 return None  # plural in form: no question agrees with it
@@ -149,13 +159,15 @@ class WalkScene:
           anywhere: names do not say the room.
         """
         shown = [p for p in self.house.placements if p.object_class == CLASS and p.id in self.glimpsed]
-        names: dict[str, list[str]] = {}
+        names, also = dict[str, list[str]](), list[str]()
         for p in shown:
             person, how = person_of(p.asset), "sitting" if "sitting" in self.assets[p.id].tags else "standing"
             words = [person.noun, f"{how} {person.noun}", person.words]
             words += [f"{person.noun} in the {self.room_name(p.room)}"] if p.room in self.rooms and not anywhere else []
             names[p.id] = [f"the {w}" for w in words]
-        every = [name for of_one in names.values() for name in of_one]
+            if other := ASKING["taken_for"].get(person.id):
+                also += [name.replace(f" {person.noun}", f" {other}") for name in names[p.id]]
+        every = also + [name for of_one in names.values() for name in of_one]
         alone = ((p, [n for n in names[p.id] if every.count(n) == 1]) for p in shown if p.id in self.clear)
         return self.shuffled([(p, of_one[0]) for p, of_one in alone if of_one])
 

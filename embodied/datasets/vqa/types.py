@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 import shapely
+from shapely.ops import nearest_points, substring
 
 from embodied.datasets.vqa.scene import ALIKE, ASKING, WalkScene, bearing, direction, gap, middle
 from embodied.datasets.vqa.scoring import OPTIONS, VqaQuestion
@@ -21,26 +22,30 @@ from embodied.house.shapes import footprint, inward
 from embodied.language.lexicon import UNFIT
 from embodied.language.plain_language import plural
 from embodied.light.tracing.sky import sun_direction
+from embodied.navigation.free_space import sight_floor
 
 SIDE = 15.0
 """Degrees from the border between two sides within which nothing is asked."""
 LEAST_METRES, MOST_METRES, NEARER, NEARER_METRES = 0.5, 8.0, 1.25, 0.3
 """Between things whose distance is asked for; how much farther the second nearest thing is than the nearest."""
-BEHIND, NEXT_TO, HALVED, TRIES = 110.0, 0.5, "curtain", 6
+BEHIND, NEXT_TO, HALVED, TRIES = 95.0, 0.5, "curtain", 6
 """Degrees off their way from which people do not see things; metres within which what is not on something might be
 taken to be; a class whose halves people count; times that a thing is asked about with others."""
-SUNNY, SHADY, HIGH, LATER = math.cos(math.radians(50)), math.cos(math.radians(100)), 0.15, (7.0, 9.0, 15.0, 17.0, 19.0)
+SUNNY, SHADY, HIGH, LATER = math.cos(math.radians(50)), math.cos(math.radians(115)), 0.15, (7.0, 9.0, 15.0, 17.0, 19.0)
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 """Cosines between where a window looks and the sun, at least of a sunny room and at most of others; the least height of
 the sun, the sine; hours that are asked about."""
-STANDS, CORNER, STRAIGHT, ROUTES = 1.2, 60.0, 25.0, 400
-"""Metres within which one is at a thing; degrees from which a bend of a way is a turn, and below which it is none;
-ways of a walk that are looked at."""
-FACED, TRIPLES, OFFERED = 1.0, 200, 24
-"""Least metres to what is faced; sets of three things that are looked at; most wrong options to choose from."""
+STANDS, FROM_WALL, CORNER, STRAIGHT, ROUTES = 1.2, 0.4, 60.0, 25.0, 400
+"""Metres within which one is at a thing, and from the middle of what stands or hangs at a wall to before it; degrees
+from which a bend of a way is a turn, and below which it is none; ways of a walk that are looked at."""
+FACED, SETS_OFF, TRIPLES, OFFERED = 1.0, 1.5, 200, 24
+"""Least metres to what is faced, and along a way to where one sets off to; sets of three things that are looked at;
+most wrong options to choose from."""
+UNDERFOOT, WORKTOPS = {*ASKING["underfoot"]}, {*ASKING["worktops"]}
 Sides = dict[str, tuple[float, float]]
 """Degrees to the left, from and to."""
 TWO_SIDES: Sides = {"left": (0, 180), "right": (-180, 0)}
+BESIDE: Sides = {"left": (5, 165), "right": (-165, -5)}
 LEFT_RIGHT_BACK: Sides = {"left": (0, 135), "right": (-135, 0), "back": (135, 225)}
 FOUR_SIDES: Sides = {"straight on": (-45, 45), "left": (45, 135), "back": (135, 225), "right": (-135, -45)}
 QUARTERS: Sides = {"front-left": (0, 90), "back-left": (90, 180), "back-right": (-180, -90), "front-right": (-90, 0)}
@@ -56,15 +61,24 @@ def groups(s: WalkScene, most: int, least: int = 2) -> Iterator[list[tuple[Place
             yield [*things[k:], *things[:k]][:most]
 
 
-def side_of(angle: float, sides: Sides) -> str | None:
+def side_of(angle: float, sides: Sides, margin: float = SIDE) -> str | None:
     """The side that an angle, degrees to the left, is well inside of."""
-    inside = (name for name, (low, high) in sides.items() if SIDE <= (angle - low) % 360 <= high - low - SIDE)
+    inside = (name for name, (low, high) in sides.items() if margin <= (angle - low) % 360 <= high - low - margin)
     return next(inside, None)
 
 
-def sided(s: WalkScene, angle: float, sides: Sides, about: Iterable[str], **slots: str) -> Asked:
-    """A question for the side on which something lies; none near the border between two."""
-    if side := side_of(angle, sides):
+def corners(p: Placement) -> np.ndarray:
+    """(4, 2) of the outline from above, metres."""
+    return np.array(footprint(p).exterior.coords)[:4]
+
+
+def sided(
+    s: WalkScene, angle: float, sides: Sides, about: Iterable[str], also: Iterable[float] = (), **slots: str
+) -> Asked:
+    """A question for the side on which something lies; none near the border between two, or where not all of `also`,
+    the angles of its parts, are on that side."""
+    side = side_of(angle, sides)
+    if side and all(side_of(x, sides, 0.0) == side for x in also):
         yield s.ask(side, about, [x for x in sides if x != side], f"{angle:.0f} degrees to the left", **slots)
 
 
@@ -75,7 +89,8 @@ def counting(s: WalkScene) -> Asked:
         noun = s.noun(name)
         there = {p.id: p.object_class for p in s.called(noun) if (p.room == room if room else p.id in s.glimpsed)}
         alone = {*there.values()} == {name} and there.keys() <= s.clear.keys()
-        if 2 <= len(there) <= 12 and plural(noun) != noun and alone and name != HALVED and name not in parts:
+        countable = name not in {HALVED, *parts, *WORKTOPS}
+        if 2 <= len(there) <= 12 and plural(noun) != noun and alone and countable:
             where = s.room_name(room) if room else "video"
             yield s.ask(str(len(there)), (room, *there), things=plural(noun), room=where)
 
@@ -96,7 +111,8 @@ def nearest(s: WalkScene) -> Asked:
 
 
 def size(s: WalkScene) -> Asked:
-    yield from (s.ask(f"{100 * max(p.size):.0f}", (p.id,), a=name) for p, name in s.named(s.things))
+    things = [p for p in s.things if p.object_class not in ASKING["oversized"]]
+    yield from (s.ask(f"{100 * max(p.size):.0f}", (p.id,), a=name) for p, name in s.named(things))
 
 
 def room_size(s: WalkScene) -> Asked:
@@ -112,9 +128,15 @@ def turned(sides: Sides) -> QuestionType:
         for three in s.shuffled([x for of_room in things for x in itertools.combinations(of_room, 3)])[:TRIPLES]:
             questions = dict[str, VqaQuestion]()
             for (a, first), (b, second), (c, third) in s.shuffled([*itertools.permutations(three)]):
-                if min(math.dist(middle(a), middle(t)) for t in (b, c)) > FACED:
-                    angle = bearing(middle(a), direction(middle(a), middle(b)), middle(c))
-                    asked = sided(s, angle, sides, (a.id, b.id, c.id), a=first, b=second, c=third)
+                edge = np.array(nearest_points(footprint(a), footprint(b))[0].coords[0])
+                apart = not footprint(b).intersects(footprint(c)) and not {a.object_class, s.carrier_of(a)} & UNDERFOOT
+                if apart and min(math.dist(middle(a), middle(t)) for t in (b, c)) > FACED:
+                    angle, *also = (
+                        bearing(eye, direction(eye, middle(b)), at)
+                        for eye in (middle(a), edge)
+                        for at in (middle(c), *(corners(c) + middle(c)) / 2)
+                    )
+                    asked = sided(s, angle, sides, (a.id, b.id, c.id), also, a=first, b=second, c=third)
                     questions |= {q.answer: q for q in asked}
             yield from questions.values() if len(questions) == len(sides) else ()
 
@@ -156,13 +178,16 @@ def carried(shelf: bool) -> QuestionType:
 
     def asked(s: WalkScene) -> Asked:
         small = [p for p in s.things if p.parent is not None]
+        of_room = {r.id: [p for p in s.house.placements if p.room == r.id] for r in s.house.rooms}
         for carrier, name in s.named(s.things):
             classes = {p.object_class for p in s.house.placements if p.parent == carrier.id}
             there = [p for p in small if p.parent == carrier.id and s.carrier_of(p).endswith(" shelf") == shelf]
-            alike = {*classes, *(c for name in classes for c in ALIKE.get(name, ()))}
-            alike |= {*ASKING["parts"].get(carrier.object_class, ())}
-            beside = {p.object_class for p in small if gap(carrier, p) < NEXT_TO}
-            away = {p.object_class for p in small} - alike - beside
+            there = [p for p in there if any({p.id, carrier.id} <= {*f.clear} for f in s.walk.frames)]
+            beside = {p.object_class for p in of_room[carrier.room] if gap(carrier, p) < NEXT_TO}
+            if carrier.object_class in WORKTOPS:
+                beside |= {p.object_class for p in small if p.room == carrier.room and s.carrier_of(p) in WORKTOPS}
+            alike = {*beside, *classes, *(c for name in beside | classes for c in ALIKE.get(name, ()))}
+            away = {p.object_class for p in small} - alike - {*ASKING["parts"].get(carrier.object_class, ())}
             for p in s.shuffled(there) if len(away) > 2 else ():
                 wrong = s.shuffled(sorted(away))[:OFFERED]
                 fact = f"on it: {', '.join(sorted(classes))}"
@@ -194,7 +219,10 @@ def openness(s: WalkScene) -> Asked:
 def change(s: WalkScene) -> Asked:
     half = len(s.walk.frames) // 2
     twice = {i for f in s.walk.frames[:half] for i in f.clear} & {i for f in s.walk.frames[half:] for i in f.clear}
+    moved = {s.house.placement_by_id[i].object_class for i in s.walk.moved}
+    alike = {*moved, *(c for name in moved for c in ALIKE.get(name, ()))}
     others = [p for p in s.things if p.id in twice & s.movable and not {p.id, p.parent} & {*s.walk.moved}]
+    others = [p for p in others if p.object_class not in alike]
     for p, name in s.named(TRIES * [p for p in s.things if p.id in s.walk.moved]):
         wrong = s.named([q for q in others if q.room == p.room])[:3]
         if len(wrong) > 1:
@@ -211,8 +239,8 @@ def whereabouts(s: WalkScene) -> Asked:
 def seen_by(s: WalkScene) -> Asked:
     for p, name in s.people():
         here, seen = s.in_room(p.room), s.walk.views.get(p.id, {})
-        behind = [t for t in here if t.id not in seen and abs(bearing(middle(p), facing_of(p.yaw), middle(t))) > BEHIND]
-        wrong = s.named(behind)[:OFFERED]
+        off = lambda t: min(abs(bearing(middle(p), facing_of(p.yaw), at)) for at in corners(t))  # noqa: B023
+        wrong = s.named([t for t in here if t.id not in seen and off(t) > BEHIND])[:OFFERED]
         for t, right in s.named([t for t in here if seen.get(t.id, 0.0) > CLEAR_SHARE])[: len(wrong) > 1]:
             yield s.ask(right, (p.id, t.id, *(q.id for q, _ in wrong)), [n for _, n in wrong], a=name)
 
@@ -220,24 +248,23 @@ def seen_by(s: WalkScene) -> Asked:
 def side_of_person(s: WalkScene) -> Asked:
     for p, name in s.people():
         for t, thing in s.named(s.in_room(p.room)):
-            angle = bearing(middle(p), facing_of(p.yaw), middle(t))
+            angle, *also = (bearing(middle(p), facing_of(p.yaw), at) for at in (middle(t), *corners(t)))
             if math.dist(middle(p), middle(t)) > LEAST_METRES:
-                yield from sided(s, angle, TWO_SIDES, (p.id, t.id), a=name, b=thing)
+                yield from sided(s, angle, BESIDE, (p.id, t.id), also, a=name, b=thing)
 
 
 def sun(s: WalkScene) -> Asked:
     """A room into which the sun shines at an hour; into the others it cannot. Words say which way the video begins."""
-    windows = [o for o in s.house.openings if o.rooms[1] is None and o.kind not in HINGED]
+    openings = [o for o in s.house.openings if o.rooms[1] is None]
     looks = COMPASS[round(math.degrees(s.house.sky.north - s.walk.frames[0].yaw) / 45) % 8]
     for hour in s.shuffled(LATER):
         towards = sun_direction(dataclasses.replace(s.house.sky, hour=hour))
-        of_room: dict[str, list[float]] = {r: [SHADY - 1] for r in s.looked_at}
-        for o in windows:
-            of_room.get(o.rooms[0], []).append(float(-inward(s.house, o) @ towards[:2] / math.hypot(*towards[:2])))
-        shady = [r for r, cosines in of_room.items() if len(cosines) > 1 and max(cosines) < SHADY]
-        for room in (
-            [r for r, cosines in of_room.items() if max(cosines) > SUNNY] if shady and towards[2] > HIGH else ()
-        ):
+        lit = [(o, float(-inward(s.house, o) @ towards[:2] / math.hypot(*towards[:2]))) for o in openings]
+        windows = [(o.rooms[0], cosine) for o, cosine in lit if o.kind not in HINGED]  # doors may have panes
+        sunny = [r for r in s.looked_at if any(room == r and cosine > SUNNY for room, cosine in windows)]
+        shady = [r for r in s.looked_at if any(room == r for room, _ in windows)]
+        shady = [r for r in shady if all(cosine < SHADY for o, cosine in lit if o.rooms[0] == r)]
+        for room in sunny if shady and towards[2] > HIGH else ():
             about = (room, *shady[:3])
             names = [s.room_name(r) for r in about]
             yield s.ask(names[0], about, names[1:], f"at {hour:.0f}:00", looks=looks, hour=f"{hour:.0f}")
@@ -250,7 +277,8 @@ def next_step(s: WalkScene) -> Asked:
     for t, name in s.named([t for t in s.things if t.room != s.graph.room_of_node[here]]):
         goals = [n for n, room in enumerate(s.graph.room_of_node) if room == t.room]
         way = s.graph.path(here, min(goals, key=lambda n: math.dist(spots[n, :2], middle(t))))
-        angle = bearing(spots[here, :2], last.yaw, spots[way[1], :2])
+        ahead = shapely.LineString(spots[way, :2]).interpolate(SETS_OFF)
+        angle = bearing(spots[here, :2], last.yaw, np.array(ahead.coords[0]))
         yield from sided(s, angle, FOUR_SIDES, (t.id,), a=name)
 
 
@@ -259,6 +287,7 @@ def route(s: WalkScene) -> Asked:
     spots = s.graph.positions[:, :2]
     room_of, near = s.graph.room_of_node, lambda t, n: footprint(t).distance(shapely.Point(spots[n])) < STANDS
     at = {n: [t for t in s.things if t.room == room and near(t, n)] for n, room in enumerate(room_of)}
+    floors = [sight_floor(s.house, k) for k in range(len(s.house.storeys))]
     ends = [n for n, room in enumerate(room_of) if at[n] and room in s.walk.rooms]
     for way in (s.graph.path(*pair) for pair in s.shuffled([*itertools.permutations(ends, 2)])[:ROUTES]):
         bends = [
@@ -268,9 +297,15 @@ def route(s: WalkScene) -> Asked:
         stops = [thing for n in (way[0], *(n for n, _ in turns), way[-1]) for thing in s.named(at[n])[:1]]
         if np.ptp(s.graph.positions[way, 2]) or not 1 <= len(turns) <= 2 or min(abs(a) for _, a in turns) < CORNER:
             continue
+        floor, pairs = floors[s.house.room_by_id[room_of[way[0]]].storey], [*itertools.pairwise(stops)]
+        lines = [shapely.LineString([middle(a), middle(b)]) for (a, _), (b, _) in pairs]
+        if any(x.length < FACED or gap(a, b) < LEAST_METRES for x, ((a, _), (b, _)) in zip(lines, pairs)):
+            continue
+        if not all(floor.covers(substring(x, FROM_WALL, max(x.length - FROM_WALL, FROM_WALL))) for x in lines):
+            continue
         at_things = [middle(t) for t, _ in stops]
         seen = [bearing(b, direction(a, b), c) for a, b, c in zip(at_things, at_things[1:], at_things[2:])]
-        agree = (angle * true > 0 and STRAIGHT < abs(angle) < 180 - SIDE for angle, (_, true) in zip(seen, turns))
+        agree = (angle * true > 0 and STRAIGHT < abs(angle) < 180 - 2 * SIDE for angle, (_, true) in zip(seen, turns))
         if len({t.id for t, _ in stops}) < len(turns) + 2 or not all(agree):
             continue
         names = [name for _, name in stops]
