@@ -139,9 +139,9 @@ def lived_in(house: House, graph: NavGraph, catalogue: Catalogue, rng: np.random
 def opened(
     world: World, free: Mapping[str, float], path: Sequence[int], first: int, rng: np.random.Generator
 ) -> dict[str, float]:
-    """How far doors and drawers are open during a walk along nodes, by name: doors that are nearly shut stand wide open;
-    those of every other thing, from the `first`, are open where they can and are in the way of neither another nor the
-    walk; the other things are shut."""
+    """How far doors and drawers are open during a walk along nodes, by name: nearly shut doors of the house stand wide
+    open; those of every other thing, from the `first`, are open where they can and are in the way of neither another
+    nor the walk; the other things are shut."""
     graph, rooms = world.graph, {world.graph.room_of_node[n] for n in path}
     openness = dict.fromkeys(sorted(graph.closed), 1.0)
     taken = shapely.LineString(graph.positions[[*path, path[-1]], :2]).buffer(PASSING)

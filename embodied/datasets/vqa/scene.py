@@ -29,10 +29,11 @@ ASKING: Mapping[str, Any] = read_toml(Path(templates.__file__).with_name("vqa.to
 """Type to habit to templates; and 'alike', groups of classes that people do not tell apart, 'unsaid', synonyms that
 mislead, 'parts', classes that may be seen in others."""
 ALIKE: Mapping[str, list[str]] = {name: group for group in ASKING["alike"] for name in group}
+UNLIKE = {*ASKING["unlike"]}
 EASILY_MOVED = ("chair", "stool", "plant", "basket", "box", "bag", "table", "toy", "horse", "suitcase", "stand", " bin")
 LEAST_MOVED = 0.3
 """Parts of the names of classes of what is moved between two visits, and its longest side at least, metres."""
-FURNITURE, FURNITURE_SHARE, SEEN_THROUGH = 0.5, 0.008, ("transparent", "clear", "coloured", "natural")
+FURNITURE, FURNITURE_SHARE, SEEN_THROUGH = 0.5, 0.015, ("transparent", "clear", "coloured", "natural")
 """Longest side of furniture, metres, and the share of a frame in which it is recognised; words that are no colour."""
 FLOORS = {1: ("",), 2: ("ground", "upper"), 3: ("ground", "middle", "top")}
 """Storeys, by how many there are."""
@@ -59,7 +60,7 @@ class WalkScene:
         self.glimpsed |= {p.id: 0 for p in house.placements if (p.group or "").startswith(STORED)}
         self.movable = movable(house, catalogue)
         self.things = [p for p in house.placements if p.id in self.clear and p.object_class not in UNFIT]
-        self.things = [p for p in self.things if p.asset not in ASKING["unlike"]]
+        self.things = [p for p in self.things if not UNLIKE & {p.asset, p.object_class}]
         kinds = [(r.kind, r.storey) for r in house.rooms]
         self.rooms = {r.id: kind for r, kind in zip(house.rooms, kinds) if kinds.count(kind) == 1}
         self.looked_at = [r for r in dict.fromkeys(walk.rooms) if r in self.rooms]
@@ -165,8 +166,12 @@ class WalkScene:
             words = [person.noun, f"{how} {person.noun}", person.words]
             words += [f"{person.noun} in the {self.room_name(p.room)}"] if p.room in self.rooms and not anywhere else []
             names[p.id] = [f"the {w}" for w in words]
+            alike = {person_of(q.asset).id for q in shown} & {*ASKING["lookalikes"]}
+            if person.id in alike and len(alike) > 1:
+                names[p.id] = []
             if other := ASKING["taken_for"].get(person.id):
                 also += [name.replace(f" {person.noun}", f" {other}") for name in names[p.id]]
+                names[p.id] = names[p.id][2:]
         every = also + [name for of_one in names.values() for name in of_one]
         alone = ((p, [n for n in names[p.id] if every.count(n) == 1]) for p in shown if p.id in self.clear)
         return self.shuffled([(p, of_one[0]) for p, of_one in alone if of_one])

@@ -28,9 +28,9 @@ SIDE = 15.0
 """Degrees from the border between two sides within which nothing is asked."""
 LEAST_METRES, MOST_METRES, NEARER, NEARER_METRES = 0.5, 8.0, 1.25, 0.3
 """Between things whose distance is asked for; how much farther the second nearest thing is than the nearest."""
-BEHIND, NEXT_TO, HALVED, TRIES = 95.0, 0.5, "curtain", 6
-"""Degrees off their way from which people do not see things; metres within which what is not on something might be
-taken to be; a class whose halves people count; times that a thing is asked about with others."""
+AHEAD, BEHIND, NEXT_TO, HALVED, TRIES = 60.0, 95.0, 0.5, "curtain", 6
+"""Degrees off their way up to which people see things, and from which they do not; metres within which what is not on
+something might be taken to be; a class whose halves people count; times that a thing is asked about with others."""
 SUNNY, SHADY, HIGH, LATER = math.cos(math.radians(50)), math.cos(math.radians(115)), 0.15, (7.0, 9.0, 15.0, 17.0, 19.0)
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 """Cosines between where a window looks and the sun, at least of a sunny room and at most of others; the least height of
@@ -88,7 +88,7 @@ def counting(s: WalkScene) -> Asked:
     for room, name in s.shuffled([*rooms, *(("", p.object_class) for p in s.things)]):
         noun = s.noun(name)
         there = {p.id: p.object_class for p in s.called(noun) if (p.room == room if room else p.id in s.glimpsed)}
-        alone = {*there.values()} == {name} and there.keys() <= s.clear.keys()
+        alone = {*there.values()} == {name} and there.keys() <= {p.id for p in s.things}
         countable = name not in {HALVED, *parts, *WORKTOPS}
         if 2 <= len(there) <= 12 and plural(noun) != noun and alone and countable:
             where = s.room_name(room) if room else "video"
@@ -121,7 +121,7 @@ def room_size(s: WalkScene) -> Asked:
 
 
 def turned(sides: Sides) -> QuestionType:
-    """The type that asks where a thing is for who stands by one and faces another: each side of the same three."""
+    """The type that asks where a thing is for who stands by one and faces another, and for the mirror image."""
 
     def asked(s: WalkScene) -> Asked:
         things = [s.named(s.in_room(room)) for room in s.looked_at]
@@ -138,7 +138,8 @@ def turned(sides: Sides) -> QuestionType:
                     )
                     asked = sided(s, angle, sides, (a.id, b.id, c.id), also, a=first, b=second, c=third)
                     questions |= {q.answer: q for q in asked}
-            yield from questions.values() if len(questions) == len(sides) else ()
+            mirror = lambda side: "right".join(x.replace("right", "left") for x in side.split("left"))
+            yield from (q for side, q in questions.items() if mirror(side) in questions)
 
     return asked
 
@@ -241,7 +242,10 @@ def seen_by(s: WalkScene) -> Asked:
         here, seen = s.in_room(p.room), s.walk.views.get(p.id, {})
         off = lambda t: min(abs(bearing(middle(p), facing_of(p.yaw), at)) for at in corners(t))  # noqa: B023
         wrong = s.named([t for t in here if t.id not in seen and off(t) > BEHIND])[:OFFERED]
-        for t, right in s.named([t for t in here if seen.get(t.id, 0.0) > CLEAR_SHARE])[: len(wrong) > 1]:
+        ahead = [t for t in here if seen.get(t.id, 0.0) > CLEAR_SHARE and gap(p, t) > FROM_WALL]
+        ahead = [t for t in ahead if abs(bearing(middle(p), facing_of(p.yaw), middle(t))) < AHEAD]
+        wrong = [(q, n) for q, n in wrong if q.parent not in {t.id for t in ahead}]
+        for t, right in s.named(ahead)[: len(wrong) > 1]:
             yield s.ask(right, (p.id, t.id, *(q.id for q, _ in wrong)), [n for _, n in wrong], a=name)
 
 
@@ -249,7 +253,7 @@ def side_of_person(s: WalkScene) -> Asked:
     for p, name in s.people():
         for t, thing in s.named(s.in_room(p.room)):
             angle, *also = (bearing(middle(p), facing_of(p.yaw), at) for at in (middle(t), *corners(t)))
-            if math.dist(middle(p), middle(t)) > LEAST_METRES:
+            if math.dist(middle(p), middle(t)) > LEAST_METRES and gap(p, t) > FROM_WALL:
                 yield from sided(s, angle, BESIDE, (p.id, t.id), also, a=name, b=thing)
 
 
@@ -287,6 +291,7 @@ def route(s: WalkScene) -> Asked:
     spots = s.graph.positions[:, :2]
     room_of, near = s.graph.room_of_node, lambda t, n: footprint(t).distance(shapely.Point(spots[n])) < STANDS
     at = {n: [t for t in s.things if t.room == room and near(t, n)] for n, room in enumerate(room_of)}
+    faces = lambda t, q: t.parent is not None or abs(bearing(middle(t), facing_of(t.yaw), middle(q))) < 90
     floors = [sight_floor(s.house, k) for k in range(len(s.house.storeys))]
     ends = [n for n, room in enumerate(room_of) if at[n] and room in s.walk.rooms]
     for way in (s.graph.path(*pair) for pair in s.shuffled([*itertools.permutations(ends, 2)])[:ROUTES]):
@@ -303,9 +308,11 @@ def route(s: WalkScene) -> Asked:
             continue
         if not all(floor.covers(substring(x, FROM_WALL, max(x.length - FROM_WALL, FROM_WALL))) for x in lines):
             continue
+        if not all(faces(a, b) and faces(b, a) for (a, _), (b, _) in pairs):
+            continue
         at_things = [middle(t) for t, _ in stops]
         seen = [bearing(b, direction(a, b), c) for a, b, c in zip(at_things, at_things[1:], at_things[2:])]
-        agree = (angle * true > 0 and STRAIGHT < abs(angle) < 180 - 2 * SIDE for angle, (_, true) in zip(seen, turns))
+        agree = (angle * true > 0 and 3 * SIDE < abs(angle) < 180 - 2 * SIDE for angle, (_, true) in zip(seen, turns))
         if len({t.id for t, _ in stops}) < len(turns) + 2 or not all(agree):
             continue
         names = [name for _, name in stops]
