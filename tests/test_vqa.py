@@ -62,7 +62,7 @@ def scene(clear=None, second_sofa=False, person=None) -> WalkScene:
         house = dataclasses.replace(house, placements=(*house.placements, p))
     house = dataclasses.replace(house, placements=(*house.placements, *([person] if person else [])))
     ids = [p.id for p in house.placements]
-    frame = WalkFrame((2.5, 2.0, 1.5), 0.0, dict.fromkeys(ids, 0.02), tuple(ids if clear is None else clear))
+    frame = WalkFrame((2.5, 2.0, 1.5), 0.0, dict.fromkeys(ids, 0.3), tuple(ids if clear is None else clear))
     walk = Walk("hand_0000_0", "hand_0000", ("living_room_1", "bedroom_1"), (frame,) * 3)
     return WalkScene(walk, house, build_graph(two_rooms()), catalogue)
 
@@ -251,7 +251,7 @@ def test_people_are_told_apart_by_how_they_look():
         ),
     )
     frames = tuple(
-        dataclasses.replace(f, shares={**f.shares, "person_2": 0.02}, clear=(*f.clear, "person_2"))
+        dataclasses.replace(f, shares={**f.shares, "person_2": 0.6}, clear=(*f.clear, "person_2"))
         for f in two.walk.frames
     )
     two = WalkScene(dataclasses.replace(two.walk, frames=frames), house, two.graph, load_catalogue(None)).asked(

@@ -12,7 +12,7 @@ from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import read_toml
 from embodied.assets.people.figures import person_of
 from embodied.datasets.vqa.scoring import VqaQuestion
-from embodied.datasets.vqa.walks import GLIMPSE, Walk
+from embodied.datasets.vqa.walks import GLIMPSE, Walk, outline
 from embodied.generate.people import CLASS
 from embodied.geometry import wrap
 from embodied.house.contents import STORED
@@ -33,8 +33,9 @@ UNLIKE = {*ASKING["unlike"]}
 EASILY_MOVED = ("chair", "stool", "plant", "basket", "box", "bag", "table", "toy", "horse", "suitcase", "stand", " bin")
 LEAST_MOVED = 0.3
 """Parts of the names of classes of what is moved between two visits, and its longest side at least, metres."""
-FURNITURE, FURNITURE_SHARE, SEEN_THROUGH = 0.5, 0.015, ("transparent", "clear", "coloured", "natural")
-"""Longest side of furniture, metres, and the share of a frame in which it is recognised; words that are no colour."""
+FURNITURE, FURNITURE_SHARE, SHOWN, SEEN_THROUGH = 0.5, 0.015, 0.25, ("transparent", "clear", "coloured", "natural")
+"""Longest side of furniture, metres, and the shares of a frame and of the outline of its box in which it is
+recognised; words that are no colour."""
 FLOORS = {1: ("",), 2: ("ground", "upper"), 3: ("ground", "middle", "top")}
 """Storeys, by how many there are."""
 
@@ -53,9 +54,9 @@ class WalkScene:
         self.kind, self.by, self.rng = "", templates.SPEAKERS[0], np.random.default_rng(0)
         self._called: dict[str, list[Placement]] = {}
         self._nouns: dict[str, str] = {}
-        small = {p.id for p in house.placements if max(p.size) < FURNITURE}
-        known = ([o for o in f.clear if o in small or f.shares[o] >= FURNITURE_SHARE] for f in walk.frames)
-        self.clear = _firsts(known)
+        large = {p.id: p for p in house.placements if max(p.size) > FURNITURE}
+        whole = lambda f, p: f.shares[p.id] >= max(FURNITURE_SHARE, SHOWN * outline(p, f.position, f.yaw, 9.0))
+        self.clear = _firsts([o for o in f.clear if o not in large or whole(f, large[o])] for f in walk.frames)
         self.glimpsed = _firsts([o for o, share in f.shares.items() if share >= GLIMPSE] for f in walk.frames)
         self.glimpsed |= {p.id: 0 for p in house.placements if (p.group or "").startswith(STORED)}
         self.movable = movable(house, catalogue)

@@ -4,6 +4,7 @@ ambiguous, by the margins below. Words are in embodied/language/vqa.toml. Ten ar
 """
 
 import dataclasses
+import functools
 import itertools
 import math
 from collections import Counter
@@ -22,6 +23,7 @@ from embodied.house.shapes import footprint, inward
 from embodied.language.lexicon import UNFIT
 from embodied.language.plain_language import plural
 from embodied.light.tracing.sky import sun_direction
+from embodied.navigation.floor_ways import FloorWays
 from embodied.navigation.free_space import sight_floor
 
 SIDE = 15.0
@@ -70,6 +72,13 @@ def side_of(angle: float, sides: Sides, margin: float = SIDE) -> str | None:
 def corners(p: Placement) -> np.ndarray:
     """(4, 2) of the outline from above, metres."""
     return np.array(footprint(p).exterior.coords)[:4]
+
+
+def before(s: WalkScene, p: Placement) -> np.ndarray:
+    """(2,) where one stands before a thing, or before what it is on, metres."""
+    p = s.house.placement_by_id[p.parent] if p.parent else p
+    front = facing_of(p.yaw)
+    return middle(p) + (p.size[1] / 2 + FROM_WALL) * np.array([math.cos(front), math.sin(front)])
 
 
 def sided(
@@ -133,7 +142,7 @@ def turned(sides: Sides) -> QuestionType:
                 if apart and min(math.dist(middle(a), middle(t)) for t in (b, c)) > FACED:
                     angle, *also = (
                         bearing(eye, direction(eye, middle(b)), at)
-                        for eye in (middle(a), edge)
+                        for eye in (middle(a), edge, before(s, a))
                         for at in (middle(c), *(corners(c) + middle(c)) / 2)
                     )
                     asked = sided(s, angle, sides, (a.id, b.id, c.id), also, a=first, b=second, c=third)
@@ -276,14 +285,20 @@ def sun(s: WalkScene) -> Asked:
 
 def next_step(s: WalkScene) -> Asked:
     """Which way somebody sets off who stands where the video ends, and looks as its last frame does."""
-    last, spots = s.walk.frames[-1], s.graph.positions
-    here = int(np.argmin(np.linalg.norm(spots - last.position, axis=1)))
-    for t, name in s.named([t for t in s.things if t.room != s.graph.room_of_node[here]]):
-        goals = [n for n, room in enumerate(s.graph.room_of_node) if room == t.room]
-        way = s.graph.path(here, min(goals, key=lambda n: math.dist(spots[n, :2], middle(t))))
-        ahead = shapely.LineString(spots[way, :2]).interpolate(SETS_OFF)
-        angle = bearing(spots[here, :2], last.yaw, np.array(ahead.coords[0]))
-        yield from sided(s, angle, FOUR_SIDES, (t.id,), a=name)
+    last, ground = s.walk.frames[-1], _ground(s.house)
+    room = s.graph.room_of_node[int(np.argmin(np.linalg.norm(s.graph.positions - last.position, axis=1)))]
+    feet = np.array([*last.position[:2], s.house.storey_of(s.house.room_by_id[room]).elevation])
+    for t, name in s.named([t for t in s.things if t.room != room]):
+        there = np.flatnonzero(ground.room_of_cell == t.room)
+        if len(there):
+            goal = there[np.linalg.norm(ground.xyz[there, :2] - middle(t), axis=1).argmin()]
+            way = ground.xyz[ground.wide_ways(np.array([goal])).cells(ground.cell_at(feet))]
+            ahead = shapely.LineString(np.concatenate([[feet], way])[:, :2]).interpolate(SETS_OFF)
+            angle = bearing(feet[:2], last.yaw, np.array(ahead.coords[0]))
+            yield from sided(s, angle, FOUR_SIDES, (t.id,), a=name)
+
+
+_ground = functools.lru_cache(4)(FloorWays)
 
 
 def route(s: WalkScene) -> Asked:

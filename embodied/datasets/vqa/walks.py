@@ -156,11 +156,11 @@ def shares_of(world: World, ids: np.ndarray) -> dict[str, float]:
     return {world.owners[i]: round(float(counts[i]) / ids.size, 5) for i in np.flatnonzero(counts)}
 
 
-def outline(p: Placement, position: Sequence[float] | np.ndarray, yaw: float) -> float:
-    """Share of a frame inside the outline of a thing's box; 0 where it reaches behind the camera."""
+def outline(p: Placement, position: Sequence[float] | np.ndarray, yaw: float, edge: float = 1.0) -> float:
+    """Area of the outline of a box, of a frame, up to its edge or farther; 0 where it reaches behind the camera."""
     flat = rectangle(*p.position[:2], *p.size[:2], p.yaw)
     corners = np.array([[x, y, p.position[2] + z] for x, y in flat for z in (0.0, p.size[2])])
-    return float(cv2.contourArea(np.clip(hull(corners, position, yaw), -1, 1))) / 4
+    return float(cv2.contourArea(np.clip(hull(corners, position, yaw), -edge, edge))) / 4
 
 
 def hull(corners: np.ndarray, position: Sequence[float] | np.ndarray, yaw: float) -> np.ndarray:
