@@ -33,7 +33,12 @@ UNLIKE = {*ASKING["unlike"]}
 EASILY_MOVED = ("chair", "stool", "plant", "basket", "box", "bag", "table", "toy", "horse", "suitcase", "stand", " bin")
 LEAST_MOVED = 0.3
 """Parts of the names of classes of what is moved between two visits, and its longest side at least, metres."""
-FURNITURE, FURNITURE_SHARE, SHOWN, SEEN_THROUGH = 0.5, 0.015, 0.25, ("transparent", "clear", "coloured", "natural")
+FURNITURE, FURNITURE_SHARE, OUTLINE_SHARE, SEEN_THROUGH = (
+    0.5,
+    0.015,
+    0.25,
+    ("transparent", "clear", "coloured", "natural"),
+)
 """Longest side of furniture, metres, and the shares of a frame and of the outline of its box in which it is
 recognised; words that are no colour."""
 FLOORS = {1: ("",), 2: ("ground", "upper"), 3: ("ground", "middle", "top")}
@@ -55,7 +60,7 @@ class WalkScene:
         self._called: dict[str, list[Placement]] = {}
         self._nouns: dict[str, str] = {}
         large = {p.id: p for p in house.placements if max(p.size) > FURNITURE}
-        whole = lambda f, p: f.shares[p.id] >= max(FURNITURE_SHARE, SHOWN * outline(p, f.position, f.yaw, 9.0))
+        whole = lambda f, p: f.shares[p.id] >= max(FURNITURE_SHARE, OUTLINE_SHARE * outline(p, f.position, f.yaw, 9.0))
         self.clear = _firsts([o for o in f.clear if o not in large or whole(f, large[o])] for f in walk.frames)
         self.glimpsed = _firsts([o for o, share in f.shares.items() if share >= GLIMPSE] for f in walk.frames)
         self.glimpsed |= {p.id: 0 for p in house.placements if (p.group or "").startswith(STORED)}

@@ -209,7 +209,8 @@ def carried(shelf: bool) -> QuestionType:
 def openness(s: WalkScene) -> Asked:
     """Which of several things is open where the others are shut, and which is shut where they are open. What has no
     name of its own is open as one of its kind, and shut if all of them are."""
-    ajar, shut = ({i for f in s.walk.frames for i in of(f)} for of in (lambda f: f.ajar, lambda f: f.shut))
+    often = Counter(i for f in s.walk.frames for i in f.ajar)
+    ajar, shut = {i for i in often if often[i] > 1}, {i for f in s.walk.frames for i in f.shut} - {*often}
 
     def named(p: Placement, an: str) -> str | None:
         alike = s.meant(p.object_class)
