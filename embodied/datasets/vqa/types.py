@@ -18,13 +18,14 @@ from embodied.datasets.vqa.scene import ALIKE, ASKING, WalkScene, bearing, direc
 from embodied.datasets.vqa.scoring import OPTIONS, VqaQuestion
 from embodied.datasets.vqa.walks import CLEAR_SHARE
 from embodied.geometry import facing_of
-from embodied.house.house import HINGED, Placement
+from embodied.house.house import HINGED, House, Placement
 from embodied.house.shapes import footprint, inward
 from embodied.language.lexicon import UNFIT
 from embodied.language.plain_language import plural
 from embodied.light.tracing.sky import sun_direction
 from embodied.navigation.floor_ways import FloorWays
 from embodied.navigation.free_space import sight_floor
+from embodied.people.day import lived_in
 
 SIDE = 15.0
 """Degrees from the border between two sides within which nothing is asked."""
@@ -49,7 +50,7 @@ Sides = dict[str, tuple[float, float]]
 TWO_SIDES: Sides = {"left": (0, 180), "right": (-180, 0)}
 BESIDE: Sides = {"left": (5, 165), "right": (-165, -5)}
 LEFT_RIGHT_BACK: Sides = {"left": (0, 135), "right": (-135, 0), "back": (135, 225)}
-FOUR_SIDES: Sides = {"straight on": (-45, 45), "left": (45, 135), "back": (135, 225), "right": (-135, -45)}
+SET_OFF_SIDES: Sides = {"straight on": (-35, 35), "left": (30, 150), "back": (135, 225), "right": (-150, -30)}
 QUARTERS: Sides = {"front-left": (0, 90), "back-left": (90, 180), "back-right": (-180, -90), "front-right": (-90, 0)}
 Asked = Iterator[VqaQuestion]
 QuestionType = Callable[[WalkScene], Asked]
@@ -296,10 +297,25 @@ def next_step(s: WalkScene) -> Asked:
             way = ground.xyz[ground.wide_ways(np.array([goal])).cells(ground.cell_at(feet))]
             ahead = shapely.LineString(np.concatenate([[feet], way])[:, :2]).interpolate(SETS_OFF)
             angle = bearing(feet[:2], last.yaw, np.array(ahead.coords[0]))
-            yield from sided(s, angle, FOUR_SIDES, (t.id,), a=name)
+            yield from sided(s, angle, SET_OFF_SIDES, (t.id,), a=name)
 
 
-_ground = functools.lru_cache(4)(FloorWays)
+@functools.lru_cache(4)
+def _ground(house: House) -> FloorWays:
+    return FloorWays(lived_in(house))
+
+
+def is_leg(s: WalkScene, floor: shapely.Geometry, a: Placement, b: Placement) -> bool:
+    """Tells whether somebody goes straight from one thing to another: not near, no wall between, and both show their
+    fronts, or what they are on does."""
+    line = shapely.LineString([middle(a), middle(b)])
+    if line.length < FACED or gap(a, b) < LEAST_METRES:
+        return False
+    ends = [FROM_WALL * (p.parent is None) for p in (a, b)]  # what stands or hangs at a wall may reach into it
+    below = [s.house.placement_by_id[p.parent] if p.parent else p for p in (a, b)]
+    seen = zip(below, (b, a))
+    fronts = all(abs(bearing(middle(p), facing_of(p.yaw), middle(q))) < 90 for p, q in seen)
+    return fronts and floor.covers(substring(line, ends[0], max(line.length - ends[1], ends[0])))
 
 
 def route(s: WalkScene) -> Asked:
@@ -307,7 +323,6 @@ def route(s: WalkScene) -> Asked:
     spots = s.graph.positions[:, :2]
     room_of, near = s.graph.room_of_node, lambda t, n: footprint(t).distance(shapely.Point(spots[n])) < STANDS
     at = {n: [t for t in s.things if t.room == room and near(t, n)] for n, room in enumerate(room_of)}
-    faces = lambda t, q: t.parent is not None or abs(bearing(middle(t), facing_of(t.yaw), middle(q))) < 90
     floors = [sight_floor(s.house, k) for k in range(len(s.house.storeys))]
     ends = [n for n, room in enumerate(room_of) if at[n] and room in s.walk.rooms]
     for way in (s.graph.path(*pair) for pair in s.shuffled([*itertools.permutations(ends, 2)])[:ROUTES]):
@@ -318,13 +333,8 @@ def route(s: WalkScene) -> Asked:
         stops = [thing for n in (way[0], *(n for n, _ in turns), way[-1]) for thing in s.named(at[n])[:1]]
         if np.ptp(s.graph.positions[way, 2]) or not 1 <= len(turns) <= 2 or min(abs(a) for _, a in turns) < CORNER:
             continue
-        floor, pairs = floors[s.house.room_by_id[room_of[way[0]]].storey], [*itertools.pairwise(stops)]
-        lines = [shapely.LineString([middle(a), middle(b)]) for (a, _), (b, _) in pairs]
-        if any(x.length < FACED or gap(a, b) < LEAST_METRES for x, ((a, _), (b, _)) in zip(lines, pairs)):
-            continue
-        if not all(floor.covers(substring(x, FROM_WALL, max(x.length - FROM_WALL, FROM_WALL))) for x in lines):
-            continue
-        if not all(faces(a, b) and faces(b, a) for (a, _), (b, _) in pairs):
+        floor = floors[s.house.room_by_id[room_of[way[0]]].storey]
+        if not all(is_leg(s, floor, a, b) for (a, _), (b, _) in itertools.pairwise(stops)):
             continue
         at_things = [middle(t) for t, _ in stops]
         seen = [bearing(b, direction(a, b), c) for a, b, c in zip(at_things, at_things[1:], at_things[2:])]
