@@ -27,20 +27,17 @@ from embodied.scene.model import loose, takeable
 
 ASKING: Mapping[str, Any] = read_toml(Path(templates.__file__).with_name("vqa.toml"))
 """Type to habit to templates; and 'alike', groups of classes that people do not tell apart, 'unsaid', synonyms that
-mislead, 'parts', classes that may be seen in others."""
+mislead, 'parts', classes that may be seen in others, and further classes that vqa.toml explains."""
 ALIKE: Mapping[str, list[str]] = {name: group for group in ASKING["alike"] for name in group}
 UNLIKE = {*ASKING["unlike"]}
+"""Classes and assets that look like other things: nothing is asked about them."""
 EASILY_MOVED = ("chair", "stool", "plant", "basket", "box", "bag", "table", "toy", "horse", "suitcase", "stand", " bin")
 LEAST_MOVED = 0.3
 """Parts of the names of classes of what is moved between two visits, and its longest side at least, metres."""
-FURNITURE, FURNITURE_SHARE, OUTLINE_SHARE, SEEN_THROUGH = (
-    0.5,
-    0.015,
-    0.25,
-    ("transparent", "clear", "coloured", "natural"),
-)
-"""Longest side of furniture, metres, and the shares of a frame and of the outline of its box in which it is
-recognised; words that are no colour."""
+FURNITURE, FURNITURE_SHARE, OUTLINE_SHARE = 0.5, 0.015, 0.25
+"""Longest side of furniture, metres, and the shares of a frame and of its outline at which it is recognised."""
+SEEN_THROUGH = ("transparent", "clear", "coloured", "natural")
+"""Colour words that tell nothing apart."""
 FLOORS = {1: ("",), 2: ("ground", "upper"), 3: ("ground", "middle", "top")}
 """Storeys, by how many there are."""
 
