@@ -18,8 +18,8 @@ from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.assets.decoding import load_record, save_record
 from embodied.house.contents import stocked
-from embodied.house.house import HINGED, House
-from embodied.house.moment import Moment, RigidPose, apart
+from embodied.house.house import HINGED, House, Opening
+from embodied.house.moment import WIDEST, Moment, RigidPose, apart
 from embodied.house.validation import load_lit_house
 from embodied.interface import Sighting
 from embodied.navigation.floor_ways import FreePoses
@@ -102,6 +102,7 @@ class World:
         self._alone = False
         self._watcher: Renderer | None = None
         self._states: dict[tuple[tuple[str, float], ...], Self] = {}
+        self._let_in = set[str]()
         self._lamps: tuple[tuple[bool, ...], Mapping[str, str]] = (), {}
         self._lit_for: tuple[set[str], Mapping[str, bool]] = set(), {}
         self._recent = functools.lru_cache(maxsize=PANORAMAS_KEPT)(self._load)
@@ -300,8 +301,14 @@ class World:
         if when is None or self.pictures.quality is None:
             return rest
         now = noticing(self._day.at(when[0]), self.graph.positions[when[1]], rest.house)
+        now = dataclasses.replace(now, openness={**openness, **now.openness})
         world._bake = rest.baked()
-        world.show(dataclasses.replace(now, openness={**openness, **now.openness}))
+        if {*world.moment.openness} != {*now.openness}:
+            world.show(Moment())  # leaves that have moved never get their light as baked again
+        if world._moving is None:
+            everybody = self._day.at(0.0)  # ids do not depend on who is seen first
+            world.show(dataclasses.replace(everybody, openness=now.openness))
+        world.show(now)
         return world
 
     @functools.cached_property
@@ -324,20 +331,37 @@ class World:
                 self._renderer.close()
             self._renderer = self._moving = None
             return
+        open_now = self._open_outwards()
+        if self._moving is not None and self._let_in - open_now:  # the light that came in is not taken away again
+            self.renderer.close()
+            self._renderer = self._moving = None
+        self._let_in = open_now
         renderer = self.renderer
         fresh = self._light_for_moment()
         moving = self._moving
         assert moving is not None  # made by the line above
         for name, parts in self._bodies.items():
             moving.add(name, parts)
-        anew = fresh or moving.needs(self.moment)
-        drawn = moving.show(self.moment, slack=slack, shadows=shadows)
+        shut = {o.id for o in self._outer_doors} - open_now
+        openness = {d: x for d, x in self.moment.openness.items() if d not in shut}
+        now = dataclasses.replace(self.moment, openness=openness)
+        anew = fresh or moving.needs(now)
+        drawn = moving.show(now, slack=slack, shadows=shadows)
         patches = [(p.page, p.row, p.column, p.picture) for p in drawn.patches]
         if anew:
             overlay = gloss_of(moving.bake, moving=moving) if _reflects(self.pictures) else None
             ids = (*self.owners, *self._bodies, *moving.people, *moving.contents)
             renderer.replace(moving.lit, moving.moving, ids, overlay)
         renderer.change(drawn.corners, patches)
+
+    @property
+    def _outer_doors(self) -> list[Opening]:
+        return [o for o in self.house.openings if o.rooms[1] is None and o.kind in HINGED]
+
+    def _open_outwards(self) -> set[str]:
+        """Outer doors that are not as the house at rest has them."""
+        ways = self.moment.openness
+        return {o.id for o in self._outer_doors if abs(ways.get(o.id, o.angle / WIDEST) * WIDEST - o.angle) > 1e-6}
 
     def _light_for_moment(self) -> bool:
         """Make what moves anew where other lamps are on, or carried, than before; True where that was so."""

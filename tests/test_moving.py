@@ -369,3 +369,17 @@ def test_who_lives_here_is_in_the_picture_and_the_same_sight_is_the_same_picture
         assert (somebody.ids == person).any() and somebody.ids.max() > nobody.ids.max()
         np.testing.assert_array_equal(draw(sight).rgb, somebody.rgb)
         np.testing.assert_array_equal(world.panorama(node).rgb, nobody.rgb)
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_a_front_door_that_was_open_leaves_no_daylight_behind(world):
+    with World(SUNNY, HandCatalogue(), world.graph, world.cache, _tiny()) as home:
+        home._bake = world.baked()
+        seen = lambda **ways: (home.show(Moment(openness=ways)), home.camera(*CAMERA).rgb.astype(int))[1]
+        rest, inner = home.camera(*CAMERA).rgb.astype(int), seen(door_1=0.9)
+        opened = seen(door_1=0.9, front_door_1=0.7)
+        assert np.abs(opened - inner).max() > 20
+        np.testing.assert_array_equal(seen(door_1=0.9), inner)
+        assert np.abs(seen(front_door_1=0.7) - rest).max() > 20
+        np.testing.assert_array_equal(seen(front_door_1=0.0), rest)

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 ATTENTION = 2.0
 """epsilon_attn, metres (Table D.1)."""
 TIE = 1e-6
-HOURS = 7.0, 22.0
-"""Of the day, between which tasks begin where people live."""
+HOURS, DAY = (7.0, 22.0), 24 * 60
+"""Of the day, between which tasks begin where people live; minutes of a day."""
 
 
 class AssistantError(ValueError):
@@ -107,14 +107,14 @@ class Residents(Anna):
     def seen_from(self, name: str, node: int, minute: int) -> tuple[float, int] | None:
         """The second of the day that is seen from a node, and the node; None where nobody is in sight."""
         day, place = self._day(name), self._places[name]
-        moment, eye = day.at(second := day.since(minute * 60)), place.graph.positions[node]
+        moment, eye = day.at(second := day.since(minute % DAY * 60)), place.graph.positions[node]
         return (second, node) if moment.openness or in_sight(moment, eye, day.house) else None
 
     def _lived(self, name: str) -> Day:
         return day_of(lived_in(self._places[name].house), self._catalogue(), seed=0)
 
     def _rooms(self, name: str, minute: int) -> list[str]:
-        day, time = self._day(name), minute * 60
+        day, time = self._day(name), minute % DAY * 60
         awake = {n for n, p in day.now(time).items() if p.leg or p.spot.activity != "sleeping"}
         at = (p.place.position for n, p in day.at(time).people.items() if n in awake)
         return [room_at(day.house, np.add(place, (0, 0, 0.5))) or "" for place in at]

@@ -286,7 +286,8 @@ def _direction(degrees: int) -> str:
 def picture(env: HelpEnv, o: Observation) -> np.ndarray:
     """The view along the agent's heading, the plan beside it, the words below."""
     nodes = [env.task.start.node, *(s.next_pose.node for s in env._steps)]
-    view = _view(env.world, env.pose)
+    seen = place_named(env.worlds, env.seen_from(env.pose.node)) if isinstance(env.world, World) else env.world
+    view = _view(seen, env.pose)
     here = env.world.house.room_by_id[env.world.graph.room_of_node[nodes[-1]]].storey
     how: dict[str, Any] = {"path": tuple(nodes), "facing": env.pose.yaw, "titles": False, "storey": here}
     plan = paint_plan(env.world.house, pixels_per_metre=28, graph=env.world.graph, **how)

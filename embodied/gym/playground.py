@@ -25,7 +25,7 @@ from embodied.kinds.plugins import assistant_of
 from embodied.kinds.task_kind import EnvInputs, TaskInputs, TaskKind, kind_named
 from embodied.language import People, PlainLanguage
 from embodied.render.pictures import PictureSettings, Unlit, parse_pictures
-from embodied.world import makers, open_world
+from embodied.world import World, makers, open_world
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
@@ -209,8 +209,10 @@ def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> Picture
 
 
 def seen_features(world: SeenPlace, catalogue: Catalogue, cache: Path) -> np.ndarray:
-    """The semantic features of a world over all classes of the catalogue, kept in the cache."""
+    """The semantic features of a world over all classes of the catalogue, kept in the cache for a house at rest."""
     classes = tuple(catalogue.classes)
+    if isinstance(world, World) and not world.moment.is_rest:
+        return semantic_features(world, classes, ROOM_KINDS)
     others = ("embodied.render.sightings", "embodied.gym.semantic_features")
     code = code_digest(*makers(Unlit()), *others)
     key = digest(world.house.digest, np.asarray(world.graph.positions).tolist(), classes, code)

@@ -404,6 +404,8 @@ class HousePages:
             shown = self._shown.get(tile)
             if shown is None or not now.things or any(tile in t.direct for t in (*shown.things, *now.things)):
                 changed.append(tile)
+        if slack == 0:
+            changed = list(new)  # as if nothing had been shown before
         same = list(new.keys() - set(changed))
         if same:
             passed = [np.stack([some[tile].light[..., 0] for tile in same]) for some in (self._shown, new)]
