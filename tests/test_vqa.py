@@ -20,7 +20,7 @@ from embodied.assets.moving_parts import OPEN
 from embodied.assets.people.figures import person_of
 from embodied.cli import main
 from embodied.datasets.vqa.build import VqaData, asked_about
-from embodied.datasets.vqa.scene import ASKING, WalkScene
+from embodied.datasets.vqa.scene import ASKING, WalkScene, recognised
 from embodied.datasets.vqa.scoring import (
     BLIND,
     LETTERS,
@@ -33,12 +33,13 @@ from embodied.datasets.vqa.scoring import (
     score,
     thinned,
 )
-from embodied.datasets.vqa.types import TYPES
+from embodied.datasets.vqa.types import TYPES, set_offs
 from embodied.datasets.vqa.walks import CLEAR_SHARE, Walk, WalkFrame, fronts_of, hull, points_of, stands_open
 from embodied.house.house import House, Placement, Storey
 from embodied.house.moment import RigidPose
 from embodied.language.lexicon import ROOM_NOUNS
 from embodied.language.plain_language import plural
+from embodied.navigation.floor_ways import FloorWays
 from embodied.navigation.graph import build_graph
 
 THINGS = {
@@ -101,6 +102,14 @@ def test_people_have_a_left_and_right_of_their_own():
     assert answers["sofa_1"] == "left" and answers["armchair_1"] == "right" and "the man" in asked[0].text
 
 
+def test_people_without_a_head_and_slivers_are_not_recognised():
+    man = Placement("man_1", "", "person", "", (2.5, 0.0, 0.0), 0.0, (0.5, 0.4, 1.8))
+    cup = Placement("cup_1", "", "cup", "", (2.5, 0.0, 1.0), 0.0, (0.1, 0.1, 0.1))
+    near, far = (WalkFrame((x, 0.0, 1.5), 0.0, {"man_1": 0.2, "cup_1": 0.005}) for x in (1.7, 0.0))
+    assert recognised(man, far) and not recognised(man, near)  # the upper edge cuts him at the neck
+    assert recognised(cup, dataclasses.replace(far, shares={"cup_1": 0.001})) and not recognised(cup, near)
+
+
 def test_no_question_is_about_what_is_only_glimpsed():
     clear = [f"{name}_1" for name in THINGS if name != "sofa"]
     questions = asked_about(scene(clear=clear), 60, seed=0)
@@ -116,8 +125,18 @@ def test_a_name_means_one_thing_to_who_reads_it(hand):
     assert len(rooms) == 2 and rooms <= {*ROOM_NOUNS["living_room"], *ROOM_NOUNS["bedroom"]}
 
 
+def test_the_next_step_has_no_other_way_as_short():
+    table = Placement("table_1", "", "table", "living_room_1", (2.5, 2.0, 0.0), 0.0, (1.4, 1.8, 0.8))
+    ground = FloorWays(dataclasses.replace(two_rooms(), placements=(table,)))
+    around = lambda y: [
+        math.degrees(x) for x in set_offs(ground, np.array([1.1, y, 0.0]), ground.cell_at(np.array([4.4, y])))
+    ]
+    left, right = sorted(around(2.0))
+    assert -90 < left < -30 and 30 < right < 90 and len(around(3.4)) == 1
+
+
 def test_rooms_of_one_kind_are_told_apart_by_their_floor():
-    house = two_rooms()
+    house = scene().house
     below, above = (dataclasses.replace(r, kind="bedroom", storey=k) for k, r in enumerate(house.rooms))
     house = dataclasses.replace(house, rooms=(below, above), storeys=(*house.storeys, Storey(2.8, 2.5)))
     s = WalkScene(scene().walk, house, build_graph(two_rooms()), load_catalogue(None))
@@ -247,7 +266,7 @@ def test_people_are_told_apart_by_how_they_look():
         two.house,
         placements=(
             *two.house.placements,
-            dataclasses.replace(woman, id="person_2", asset=other, position=(3.5, 0.6, 0.0)),
+            dataclasses.replace(woman, id="person_2", asset=other, position=(2.4, 1.2, 0.0)),
         ),
     )
     frames = tuple(

@@ -1,6 +1,7 @@
 """A walk as somebody sees it who asks about it: what was seen and when, names that fit one thing only, and words."""
 
 import copy
+import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +13,7 @@ from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import read_toml
 from embodied.assets.people.figures import person_of
 from embodied.datasets.vqa.scoring import VqaQuestion
-from embodied.datasets.vqa.walks import GLIMPSE, Walk, outline
+from embodied.datasets.vqa.walks import GLIMPSE, Walk, WalkFrame, outline
 from embodied.generate.people import CLASS
 from embodied.geometry import wrap
 from embodied.house.contents import STORED
@@ -36,6 +37,9 @@ LEAST_MOVED = 0.3
 """Parts of the names of classes of what is moved between two visits, and its longest side at least, metres."""
 FURNITURE, FURNITURE_SHARE, OUTLINE_SHARE = 0.5, 0.015, 0.25
 """Longest side of furniture, metres, and the shares of a frame and of its outline at which it is recognised."""
+SMALL_SHARE, SMALL_OUTLINE, HEAD, HEAD_SHARE = 0.008, 0.5, 0.22, 0.7
+"""Shares of a frame, or else of its outline, at which a small thing is recognised; height of a head with its hair,
+metres, and the share of the box around it that a frame must not cut off."""
 SEEN_THROUGH = ("transparent", "clear", "coloured", "natural")
 """Colour words that tell nothing apart."""
 FLOORS = {1: ("",), 2: ("ground", "upper"), 3: ("ground", "middle", "top")}
@@ -56,9 +60,7 @@ class WalkScene:
         self.kind, self.by, self.rng = "", templates.SPEAKERS[0], np.random.default_rng(0)
         self._called: dict[str, list[Placement]] = {}
         self._nouns: dict[str, str] = {}
-        large = {p.id: p for p in house.placements if max(p.size) > FURNITURE}
-        whole = lambda f, p: f.shares[p.id] >= max(FURNITURE_SHARE, OUTLINE_SHARE * outline(p, f.position, f.yaw, 9.0))
-        self.clear = _firsts([o for o in f.clear if o not in large or whole(f, large[o])] for f in walk.frames)
+        self.clear = _firsts([o for o in f.clear if recognised(house.placement_by_id[o], f)] for f in walk.frames)
         self.glimpsed = _firsts([o for o, share in f.shares.items() if share >= GLIMPSE] for f in walk.frames)
         self.glimpsed |= {p.id: 0 for p in house.placements if (p.group or "").startswith(STORED)}
         self.movable = movable(house, catalogue)
@@ -189,6 +191,20 @@ def movable(house: House, catalogue: Catalogue) -> frozenset[str]:
     is_light = lambda p: any(word in f" {p.object_class}" for word in EASILY_MOVED) and p.parent is None
     easily = {p.id for p in house.placements if is_light(p) and max(p.size) > LEAST_MOVED}
     return loose(house, catalogue) & easily | takeable(house, catalogue)
+
+
+def recognised(p: Placement, frame: WalkFrame) -> bool:
+    """Tells whether a frame that shows a thing clearly shows enough of it to be known, and of a person the head."""
+    area, share = outline(p, frame.position, frame.yaw, 9.0), frame.shares[p.id]
+    if p.object_class == CLASS:
+        x, y, z = p.position
+        head = dataclasses.replace(p, position=(x, y, z + p.size[2] - HEAD), size=(*p.size[:2], HEAD))
+        inside, whole = (outline(head, frame.position, frame.yaw, edge) for edge in (1.0, 9.0))
+        if inside < HEAD_SHARE * whole:
+            return False
+    if max(p.size) > FURNITURE:
+        return share >= max(FURNITURE_SHARE, OUTLINE_SHARE * area)
+    return share >= min(SMALL_SHARE, SMALL_OUTLINE * area)
 
 
 def _firsts(frames: Iterable[Iterable[str]]) -> dict[str, int]:

@@ -17,7 +17,7 @@ from shapely.ops import nearest_points, substring
 from embodied.datasets.vqa.scene import ALIKE, ASKING, WalkScene, bearing, direction, gap, middle
 from embodied.datasets.vqa.scoring import OPTIONS, VqaQuestion
 from embodied.datasets.vqa.walks import CLEAR_SHARE
-from embodied.geometry import facing_of
+from embodied.geometry import facing_of, wrap
 from embodied.house.house import HINGED, House, Placement
 from embodied.house.shapes import footprint, inward
 from embodied.language.lexicon import UNFIT
@@ -41,10 +41,12 @@ the sun, the sine; hours that are asked about."""
 STANDS, FROM_WALL, CORNER, STRAIGHT, ROUTES = 1.2, 0.4, 60.0, 25.0, 400
 """Metres within which one is at a thing, and from the middle of what stands or hangs at a wall to before it; degrees
 from which a bend of a way is a turn, and below which it is none; ways of a walk that are looked at."""
-FACED, SETS_OFF, TRIPLES, OFFERED = 1.0, 1.5, 200, 24
-"""Least metres to what is faced, and along a way to where one sets off to; sets of three things that are looked at;
-most wrong options to choose from."""
-UNDERFOOT, WORKTOPS = {*ASKING["underfoot"]}, {*ASKING["worktops"]}
+FACED, TRIPLES, OFFERED = 1.0, 200, 24
+"""Least metres to what is faced; sets of three things that are looked at; most wrong options to choose from."""
+SETS_OFF, ON_RING, ANOTHER, AS_SHORT = 1.5, 0.1, (60.0, 75.0), (1.15, 0.7)
+"""Metres along a way to where one sets off to, give or take; degrees to a side from which on it is another way, and
+within which it is a detour of the same; how much longer it may be, as a share and in metres, and be as short."""
+UNDERFOOT, WORKTOPS, BASIN, UNIT = {*ASKING["underfoot"]}, {*ASKING["worktops"]}, "kitchen sink", "sink unit"
 Sides = dict[str, tuple[float, float]]
 """Degrees to the left, from and to."""
 TWO_SIDES: Sides = {"left": (0, 180), "right": (-180, 0)}
@@ -217,7 +219,8 @@ def openness(s: WalkScene) -> Asked:
         alike = s.meant(p.object_class)
         several = sum(q.object_class == p.object_class for q in alike) > 1
         tells = an == "an" and (p.id in ajar or {q.id for q in alike} <= shut)
-        return s.name(p) or (f"one of the {plural(p.object_class)}" if several and tells else None)
+        name = s.name(p) or (f"one of the {plural(p.object_class)}" if several and tells else None)
+        return name.replace(BASIN, UNIT) if name else None
 
     for an, right, others in [("an", ajar, shut), ("no", shut, ajar)] * TRIES:
         for p in s.shuffled([p for p in s.things if p.id in right]):
@@ -297,7 +300,27 @@ def next_step(s: WalkScene) -> Asked:
             way = ground.xyz[ground.wide_ways(np.array([goal])).cells(ground.cell_at(feet))]
             ahead = shapely.LineString(np.concatenate([[feet], way])[:, :2]).interpolate(SETS_OFF)
             angle = bearing(feet[:2], last.yaw, np.array(ahead.coords[0]))
-            yield from sided(s, angle, SET_OFF_SIDES, (t.id,), a=name)
+            shortest, *others = (math.degrees(wrap(x - last.yaw)) for x in set_offs(ground, feet, int(goal)))
+            if side_of(angle, SET_OFF_SIDES) == side_of(shortest, SET_OFF_SIDES):
+                yield from sided(s, angle, SET_OFF_SIDES, (t.id,), others, a=name)
+
+
+def set_offs(ground: FloorWays, feet: np.ndarray, goal: int) -> list[float]:
+    """Radians in which the shortest way to a cell sets off, and then another to another side that is as short, if there
+    is one: of all places SETS_OFF away on such a way, it leads over one that is none beside the shortest way."""
+    here = ground.ways(np.array([ground.cell_at(feet)])).metres
+    ring = np.flatnonzero(np.abs(here - SETS_OFF) < ON_RING)
+    metres = here[ring] + ground.ways(np.array([goal])).metres[ring]
+    if not len(ring):
+        return [direction(feet[:2], ground.xyz[goal, :2])]
+    away = np.array([direction(feet[:2], at) for at in ground.xyz[ring, :2]])
+    first = int(metres.argmin())
+    off = np.degrees(np.abs(wrap(away - away[first])))
+    short = metres < max(AS_SHORT[0] * metres[first], metres[first] + AS_SHORT[1])
+    aside = np.where((off > ANOTHER[0]) & short, metres, np.inf)
+    second = int(aside.argmin())
+    is_another = bool(aside[second] < np.inf and off[second] > ANOTHER[1])
+    return away[[first, second][: 1 + is_another]].tolist()
 
 
 @functools.lru_cache(4)
