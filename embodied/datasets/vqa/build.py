@@ -108,9 +108,10 @@ def film_house(which: tuple[str, int], config: VqaConfig, folder: Path, cache: P
     house = lived_in(house, graph, catalogue, rng)
     with drafts(home.parent) as private, World(house, catalogue, graph, cache, pictures) as world:
         views = {p.id: view_of(world, p) for p in house.placements if p.object_class == CLASS}
+        doors = dict.fromkeys(sorted(graph.closed), 1.0)  # nearly shut doors stand wide open
         free, walks = free_openness(house, catalogue), [tour(house, graph, ROOMS, rng=rng) for _ in range(WALKS)]
         for k, (path, stops) in enumerate(walks):
-            world.show(Moment(openness=opened(world, free, path, k, rng)))
+            world.show(Moment(openness=doors | opened(world, free, path, k, rng)))
             track, to = [*cameras(graph, path, stops, rng.uniform(-np.pi, np.pi))], private / name / f"walk_{k}"
             track += look_around(track[-1][0], track[-1][1] + TURN)[: rng.integers(12)]  # it ends with any view
             rooms, frames = tuple(graph.room_of_node[n] for n in stops), tuple(film(world, track, to))
@@ -120,7 +121,7 @@ def film_house(which: tuple[str, int], config: VqaConfig, folder: Path, cache: P
         stops = sorted(walks[-1][1], key=lambda n: -rooms_of_movables.count(graph.room_of_node[n]))
         for k, node in enumerate(stops[:CHANGES], WALKS):
             to = private / name / f"walk_{k}"
-            walk = two_visits(world, node, to, f"{name}_{k}", rng)
+            walk = two_visits(world, node, doors, to, f"{name}_{k}", rng)
             write_json(to / "walk.json", dataclasses.asdict(walk))
         house.save(private / name / "house.json")
         to_matterport(graph, house, private / name / "connectivity.json")
@@ -139,11 +140,9 @@ def lived_in(house: House, graph: NavGraph, catalogue: Catalogue, rng: np.random
 def opened(
     world: World, free: Mapping[str, float], path: Sequence[int], first: int, rng: np.random.Generator
 ) -> dict[str, float]:
-    """How far doors and drawers are open during a walk along nodes, by name: nearly shut doors of the house stand wide
-    open; those of every other thing, from the `first`, are open where they can and are in the way of neither another
-    nor the walk; the other things are shut."""
-    graph, rooms = world.graph, {world.graph.room_of_node[n] for n in path}
-    openness = dict.fromkeys(sorted(graph.closed), 1.0)
+    """How far doors and drawers of furniture are open during a walk along nodes, by name: those of every other thing,
+    from the `first`, are open where they can and are in the way of neither another nor the walk; others are shut."""
+    graph, rooms, openness = world.graph, {world.graph.room_of_node[n] for n in path}, dict[str, float]()
     taken = shapely.LineString(graph.positions[[*path, path[-1]], :2]).buffer(PASSING)
     wide = lambda p: [m for m in fronts_of(p, world.catalogue) if free[f"{p.id}/{m.name}"] > WIDE[0]]
     things = [(p, fronts) for p in world.house.placements if (fronts := wide(p))]
@@ -159,11 +158,13 @@ def opened(
     return openness
 
 
-def two_visits(world: World, node: int, to: Path, name: str, rng: np.random.Generator) -> Walk:
+def two_visits(
+    world: World, node: int, openness: Mapping[str, float], to: Path, name: str, rng: np.random.Generator
+) -> Walk:
     """Film two looks around at a node, between which things of its room are moved or, small ones, taken away; the first
-    look alone where there are none."""
+    look alone where there are none. `openness` is that of doors."""
     eye, room = world.graph.positions[node], world.graph.room_of_node[node]
-    world.show(Moment())
+    world.show(Moment(openness=openness))
     track = look_around(eye, rng.uniform(-np.pi, np.pi))
     frames, moved = [*film(world, track, to)], dict[str, RigidPose]()
     small, seen = takeable(world.house, world.catalogue), {i for f in frames for i in f.clear}
@@ -175,9 +176,9 @@ def two_visits(world: World, node: int, to: Path, name: str, rng: np.random.Gene
             others = [eye, *(pose.position for pose in moved.values())]
             if spot := away if i in small else free_spot(world, p, others, rng):
                 moved[i] = RigidPose.upright(spot, p.yaw)
-    world.show(Moment(moved=moved))
+    world.show(Moment(openness=openness, moved=moved))
     frames += film(world, track, to, len(frames)) if moved else []
-    return Walk(name, world.name, (room,), tuple(frames), moved=tuple(moved))
+    return Walk(name, world.name, (room,), tuple(frames), moved=tuple(moved), openness=openness)
 
 
 def free_spot(world: World, p: Placement, others: Sequence[Any], rng: np.random.Generator) -> Triple | None:

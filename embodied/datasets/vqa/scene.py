@@ -187,9 +187,12 @@ class WalkScene:
 
 
 def movable(house: House, catalogue: Catalogue) -> frozenset[str]:
-    """Things that may be moved or taken away between two visits: furniture that is easily moved, and small things."""
+    """Things that may be moved or taken away between two visits: furniture that is easily moved and has no lamp, as a
+    lamp would show it by its light, and small things."""
+    lamps = {light.placement for light in house.lights}
+    lamps |= {p.parent for p in house.placements if p.id in lamps}
     is_light = lambda p: any(word in f" {p.object_class}" for word in EASILY_MOVED) and p.parent is None
-    easily = {p.id for p in house.placements if is_light(p) and max(p.size) > LEAST_MOVED}
+    easily = {p.id for p in house.placements if is_light(p) and max(p.size) > LEAST_MOVED} - lamps
     return loose(house, catalogue) & easily | takeable(house, catalogue)
 
 

@@ -98,13 +98,13 @@ def counting(s: WalkScene) -> Asked:
     """In a room, or in the whole video."""
     parts, rooms = s.parts(), [(p.room, p.object_class) for p in s.things if p.room in s.looked_at]
     for room, name in s.shuffled([*rooms, *(("", p.object_class) for p in s.things)]):
-        noun = s.noun(name)
+        noun, together = s.noun(name), {w: {*kinds} for w, kinds in ASKING["together"].items() if name in kinds}
         there = {p.id: p.object_class for p in s.called(noun) if (p.room == room if room else p.id in s.glimpsed)}
-        alone = {*there.values()} == {name} and there.keys() <= {p.id for p in s.things}
-        countable = name not in {HALVED, *parts, *WORKTOPS}
-        if 2 <= len(there) <= 12 and plural(noun) != noun and alone and countable:
-            where = s.room_name(room) if room else "video"
-            yield s.ask(str(len(there)), (room, *there), things=plural(noun), room=where)
+        for words, kinds in {plural(noun): {name}, **together}.items() if plural(noun) != noun else ():
+            alone = {*there.values()} <= kinds and there.keys() <= {p.id for p in s.things}
+            if 2 <= len(there) <= 12 and alone and not kinds & {HALVED, *parts, *WORKTOPS}:
+                where = s.room_name(room) if room else "video"
+                yield s.ask(str(len(there)), (room, *there), things=words, room=where)
 
 
 def distance(s: WalkScene) -> Asked:
