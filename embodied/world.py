@@ -350,8 +350,7 @@ class World:
         patches = [(p.page, p.row, p.column, p.picture) for p in drawn.patches]
         if anew:
             overlay = gloss_of(moving.bake, moving=moving) if _reflects(self.pictures) else None
-            ids = (*self.owners, *self._bodies, *moving.people, *moving.contents)
-            renderer.replace(moving.lit, moving.moving, ids, overlay)
+            renderer.replace(moving.lit, moving.moving, self.drawn, overlay)
         renderer.change(drawn.corners, patches)
 
     @property
@@ -413,6 +412,12 @@ class World:
     def owners(self) -> tuple[str, ...]:
         """Instance id i + 1 belongs to owners[i]; where things lie in open furniture, the ids after theirs differ."""
         return owners(self.house if self.pictures.quality else self.shown)
+
+    @property
+    def drawn(self) -> tuple[str, ...]:
+        """The owners, and what else is drawn now: instance id i + 1 is that of drawn[i]."""
+        m = self._moving
+        return (*self.owners, *self._bodies, *(() if m is None else (*m.people, *m.contents)))
 
     @property
     def classes(self) -> tuple[str, ...]:

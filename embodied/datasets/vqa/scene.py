@@ -62,7 +62,6 @@ class WalkScene:
         self._nouns: dict[str, str] = {}
         self.clear = _firsts([o for o in f.clear if recognised(house.placement_by_id[o], f)] for f in walk.frames)
         self.glimpsed = _firsts([o for o, share in f.shares.items() if share >= GLIMPSE] for f in walk.frames)
-        self.glimpsed |= {p.id: 0 for p in house.placements if (p.group or "").startswith(STORED)}
         self.movable = movable(house, catalogue)
         self.things = [p for p in house.placements if p.id in self.clear and p.object_class not in UNFIT]
         self.things = [p for p in self.things if not UNLIKE & {p.asset, p.object_class}]
@@ -90,8 +89,8 @@ class WalkScene:
         return [items[i] for i in self.rng.permutation(len(items))]
 
     def carrier_of(self, p: Placement) -> str:
-        """The class of what a thing rests on, and ' shelf' where it does on a shelf of it."""
-        shelf = " shelf" if (p.surface or "").startswith("shelf") else ""
+        """The class of what a thing rests on, and ' shelf' where it does on a shelf of it or lies in it."""
+        shelf = " shelf" if (p.surface or "").startswith("shelf") or (p.group or "").startswith(STORED) else ""
         return (self.house.placement_by_id[p.parent].object_class if p.parent else "") + shelf
 
     def parts(self) -> set[str]:

@@ -118,7 +118,7 @@ def view_of(world: World, person: Placement) -> dict[str, float]:
 
 def film(world: World, track: Sequence[Camera], folder: Path, first: int = 0) -> Iterator[WalkFrame]:
     """Draw frames of a walk into `folder`, from number `first`: NNN.jpg, and NNN.png with instance ids of 16 bits."""
-    things = {p.id: p for p in world.moment.applied(world.house).placements}
+    things = {p.id: p for p in world.shown.placements}
     fronts = {o: movable for o, p in things.items() if (movable := fronts_of(p, world.catalogue))}
     for k, (position, yaw) in enumerate(track, first):
         view = world.camera(position, yaw, *LENS)
@@ -128,7 +128,7 @@ def film(world: World, track: Sequence[Camera], folder: Path, first: int = 0) ->
             write_bytes(folder / f"{k:03d}.{kind}", cv2.imencode(f".{kind}", picture, how)[1].tobytes())
         shares = shares_of(world, view.ids)
         edge = np.unique(np.concatenate([view.ids[[0, -1]].ravel(), view.ids[:, [0, -1]].ravel()]))
-        cut = {world.owners[i - 1] for i in edge.tolist() if 0 < i <= len(things)}
+        cut = {world.drawn[i - 1] for i in edge.tolist() if i}
         large = [o for o, share in shares.items() if share >= LARGE or (share >= CLEAR_SHARE and o not in cut)]
         clear = sorted(o for o in large if shares[o] >= WHOLE * outline(things[o], position, yaw))
         points = points_of(view.depth, position, yaw)
@@ -151,9 +151,10 @@ def read_frame(path: Path, mode: int = cv2.IMREAD_COLOR) -> np.ndarray:
 
 
 def shares_of(world: World, ids: np.ndarray) -> dict[str, float]:
-    """Placements to their shares of a picture of instance ids."""
-    counts = np.bincount(ids.ravel(), minlength=len(world.house.placements) + 1)[1 : len(world.house.placements) + 1]
-    return {world.owners[i]: round(float(counts[i]) / ids.size, 5) for i in np.flatnonzero(counts)}
+    """Placements, and what lies in open furniture, to their shares of a picture of instance ids."""
+    counts, there = np.bincount(ids.ravel(), minlength=1)[1:], {p.id for p in world.shown.placements}
+    shares = {world.drawn[i]: round(float(counts[i]) / ids.size, 5) for i in np.flatnonzero(counts)}
+    return {name: share for name, share in shares.items() if name in there}
 
 
 def outline(p: Placement, position: Sequence[float] | np.ndarray, yaw: float, edge: float = 1.0) -> float:
