@@ -171,10 +171,12 @@ def sheet(data: VqaData, question: VqaQuestion, columns: int = 4, line: int = 24
     each thing best that it is about, outlined."""
     from embodied.datasets.vqa.walks import read_frame
     from embodied.house.house import House
+    from embodied.records import read_json
 
     files = data.frames(question.walk)
     house = House.load(files[0].parents[1] / "house.json")
     number = {p.id: i + 1 for i, p in enumerate(house.placements)}
+    number |= read_json(files[0].with_name("walk.json"))["inside"]
     outlined = [(name, number[name], c) for name, c in zip(question.about, COLOURS) if name in number]
     ids = [read_frame(f.with_suffix(".png"), cv2.IMREAD_UNCHANGED) for f in files]
     best = {max(range(len(ids)), key=lambda k: (ids[k] == i).sum()) for _, i, _ in outlined}

@@ -115,7 +115,9 @@ def film_house(which: tuple[str, int], config: VqaConfig, folder: Path, cache: P
             track, to = [*cameras(graph, path, stops, rng.uniform(-np.pi, np.pi))], private / name / f"walk_{k}"
             track += look_around(track[-1][0], track[-1][1] + TURN)[: rng.integers(12)]  # it ends with any view
             rooms, frames = tuple(graph.room_of_node[n] for n in stops), tuple(film(world, track, to))
-            walk = Walk(f"{name}_{k}", name, rooms, frames, openness=world.moment.openness, views=views)
+            inside = {o: i for i, o in enumerate(world.drawn, 1) if o not in house.placement_by_id}
+            inside = {o: inside[o] for o in sorted({o for f in frames for o in f.shares} & inside.keys())}
+            walk = Walk(f"{name}_{k}", name, rooms, frames, (), world.moment.openness, inside, views)
             write_json(to / "walk.json", dataclasses.asdict(walk))
         rooms_of_movables = [house.placement_by_id[i].room for i in sorted(movable(house, catalogue))]
         stops = sorted(walks[-1][1], key=lambda n: -rooms_of_movables.count(graph.room_of_node[n]))

@@ -150,7 +150,7 @@ def narrowed(questions: Questions, seed: int) -> list[VqaQuestion]:
 
 def _cells(q: VqaQuestion) -> list[tuple[str, str]]:
     """The kind of thing that a question is about, with that of each option, by its id or words."""
-    fixed, kind = len(q.about) - len(q.options) + 1, lambda i: i.rpartition("_")[0]
+    fixed, kind = len(q.about) - len(q.options) + 1, lambda i: i.rpartition(".")[2].rpartition("_")[0]
     kinds = [kind(i) for i in q.about[fixed - 1 :]] if fixed > 0 else q.options
     return [(kind(q.about[0]) if len(q.about) > 1 else "", k) for k in kinds] or [("", "")]
 

@@ -57,8 +57,8 @@ class WalkFrame:
 @dataclass(frozen=True)
 class Walk:
     """walk.json: a walk through `rooms`, with a look around in each; or two looks around in one, between which `moved`
-    were moved or taken away. `openness`: of furniture that stands open beyond what the house says. `views` are what
-    people in the house see: shares of a picture from their eyes."""
+    were moved or taken away. `openness`: of furniture that stands open beyond what the house says; `inside`: what is
+    seen in it, with its instance ids. `views` are what people in the house see: shares of a picture from their eyes."""
 
     name: str
     house: str
@@ -66,6 +66,7 @@ class Walk:
     frames: tuple[WalkFrame, ...]
     moved: tuple[str, ...] = ()
     openness: Mapping[str, float] = field(default_factory=dict)
+    inside: Mapping[str, int] = field(default_factory=dict)
     views: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
