@@ -301,6 +301,14 @@ def test_the_command_makes_questions_about_what_the_frames_show(tmp_path, capsys
     owner = 1 + [p.id for p in House.load(home / "house.json").placements].index(q.about[0])
     frames = sorted((home / f"walk_{q.walk[-1]}").glob("*.png"))
     assert max((cv2.imread(str(f), -1) == owner).mean() for f in frames) >= CLEAR_SHARE
+    within = 0
+    for file in home.glob("walk_*/walk.json"):
+        walk, ids = json.loads(file.read_text()), [cv2.imread(str(f), -1) for f in sorted(file.parent.glob("*.png"))]
+        for name, i in walk["inside"].items():
+            shares = [f["shares"].get(name, 0.0) for f in walk["frames"]]
+            assert shares == pytest.approx([(m == i).mean() for m in ids], abs=1e-5) and max(shares) > 0
+        within += len(walk["inside"])
+    assert within > 3
     llm = ["evaluate", "vqa", "--data", data, "--agent", "llm", "blind", "--model", "m", "--frames", "2", "--json"]
     llm += ["--answers", str(tmp_path / "answers.sqlite")]
     with ChatServer(first_allowed) as server:
