@@ -107,6 +107,11 @@ def test_people_without_a_head_and_slivers_are_not_recognised():
     cup = Placement("cup_1", "", "cup", "", (2.5, 0.0, 1.0), 0.0, (0.1, 0.1, 0.1))
     near, far = (WalkFrame((x, 0.0, 1.5), 0.0, {"man_1": 0.2, "cup_1": 0.005}) for x in (1.7, 0.0))
     assert recognised(man, far) and not recognised(man, near)  # the upper edge cuts him at the neck
+    away = dataclasses.replace(man, yaw=math.pi / 2)  # his back to the camera
+    assert recognised(dataclasses.replace(man, yaw=0.0), far) and not recognised(away, far)
+    picture = dataclasses.replace(cup, object_class="picture", size=(0.6, 0.03, 0.6), yaw=0.0)
+    shown = dataclasses.replace(far, shares={"cup_1": 0.1})
+    assert recognised(picture, shown) and not recognised(picture, shown, "wall")  # it looks past the camera
     assert recognised(cup, dataclasses.replace(far, shares={"cup_1": 0.001})) and not recognised(cup, near)
 
 
@@ -151,8 +156,11 @@ def test_what_is_counted_is_in_a_room_or_in_the_video():
 def test_words_that_mislead_are_words_of_things():
     of = scene().lexicon
     nouns = {n for nouns in of.nouns_of.values() for n in nouns}
-    classes = {*ASKING["parts"], *(c for parts in ASKING["parts"].values() for c in parts)}
+    groups = [ASKING["alike"], ASKING["parts"], ASKING["parts"].values(), ASKING["together"].values()]
+    groups += [[ASKING[k]] for k in ("oversized", "upright", "underfoot", "worktops", "colourless")]
+    classes = {c for some in groups for group in some for c in ([group] if isinstance(group, str) else group)}
     assert {*ASKING["unsaid"]} <= nouns and classes <= {*of.nouns_of}
+    assert {*ASKING["unlike"]} <= {*of.nouns_of, *load_catalogue(None).assets}
 
 
 def test_furniture_is_open_where_its_door_and_its_inside_are_seen_and_shut_where_all_its_front_is():
@@ -195,7 +203,7 @@ def test_each_side_is_right_for_the_same_three_things(hand):
     for q in hand[1]:
         if q.type == "object_rel_direction_easy":
             sides.setdefault(tuple(sorted(q.about)), set()).add(q.answer)
-    assert len(sides) > 3 and all(x == {"left", "right"} for x in sides.values())
+    assert len(sides) > 2 and all(x == {"left", "right"} for x in sides.values())
 
 
 def test_what_is_offered_is_no_more_often_right_than_chance_has_it():
@@ -251,35 +259,37 @@ def test_a_look_around_becomes_a_strip_whose_middle_is_the_first_frame():
     assert (strip == np.roll(turns, -24)[None, :, None]).all()
 
 
-def test_people_are_told_apart_by_how_they_look():
-    key = next(a.key for a in load_catalogue(None).of_class("person") if {"female", "standing"} <= {*a.tags})
-    woman = Placement("person_1", key, "person", "living_room_1", (2.5, 0.6, 0.0), 0.0, (0.6, 0.4, 1.8))
-    other = next(
-        a.key
-        for a in load_catalogue(None).of_class("person")
-        if a.name != person_of(key).words
-        and {"female", "standing"} <= {*a.tags}
-        and person_of(a.key).noun == person_of(key).noun
-    )
-    two = scene(person=woman)
+def names_of(key: str, other: str) -> dict[str, str]:
+    """Two people who stand before the camera, by the names that fit one of them."""
+    one = Placement("person_1", key, "person", "living_room_1", (2.5, 0.6, 0.0), math.pi, (0.6, 0.4, 1.8))
+    s = scene(person=one)
     house = dataclasses.replace(
-        two.house,
+        s.house,
         placements=(
-            *two.house.placements,
-            dataclasses.replace(woman, id="person_2", asset=other, position=(2.4, 1.2, 0.0)),
+            *s.house.placements,
+            dataclasses.replace(one, id="person_2", asset=other, position=(2.4, 1.2, 0.0)),
         ),
     )
     frames = tuple(
         dataclasses.replace(f, shares={**f.shares, "person_2": 0.6}, clear=(*f.clear, "person_2"))
-        for f in two.walk.frames
+        for f in s.walk.frames
     )
-    two = WalkScene(dataclasses.replace(two.walk, frames=frames), house, two.graph, load_catalogue(None)).asked(
-        "person_room", np.random.default_rng(0)
-    )
-    assert {p.id: name for p, name in two.people()} == {
+    walk = dataclasses.replace(s.walk, frames=frames)
+    s = WalkScene(walk, house, s.graph, load_catalogue(None)).asked("person_room", np.random.default_rng(0))
+    return {p.id: name for p, name in s.people()}
+
+
+def test_people_are_told_apart_by_how_they_look():
+    standing = {person_of(a.key).id: a.key for a in load_catalogue(None).of_class("person") if "standing" in a.tags}
+    noun = {i: person_of(key).noun for i, key in standing.items()}
+    key, other = [standing[i] for i in sorted(standing) if noun[i] == "woman" and i not in ASKING["taken_for"]][:2]
+    assert names_of(key, other) == {
         "person_1": f"the {person_of(key).words}",
         "person_2": f"the {person_of(other).words}",
     }
+    for i in ASKING["taken_for"]:  # who may be taken for another still is what they are
+        like = next(key for j, key in standing.items() if j != i and noun[j] == noun[i])
+        assert f"the {noun[i]}" not in names_of(like, standing[i]).values()
 
 
 def test_plurals():

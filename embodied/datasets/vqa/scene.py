@@ -3,6 +3,7 @@
 import copy
 import dataclasses
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from embodied.assets.people.figures import person_of
 from embodied.datasets.vqa.scoring import VqaQuestion
 from embodied.datasets.vqa.walks import GLIMPSE, Walk, WalkFrame, outline
 from embodied.generate.people import CLASS
-from embodied.geometry import wrap
+from embodied.geometry import facing_of, wrap
 from embodied.house.contents import STORED
 from embodied.house.house import House, Placement
 from embodied.house.shapes import footprint
@@ -38,8 +39,10 @@ LEAST_MOVED = 0.3
 FURNITURE, FURNITURE_SHARE, OUTLINE_SHARE = 0.5, 0.015, 0.25
 """Longest side of furniture, metres, and the shares of a frame and of its outline at which it is recognised."""
 SMALL_SHARE, SMALL_OUTLINE, HEAD, HEAD_SHARE = 0.008, 0.5, 0.22, 0.7
+FROM_BEHIND, OBLIQUE, HIGH = 120.0, 65.0, 1.4
 """Shares of a frame, or else of its outline, at which a small thing is recognised; height of a head with its hair,
-metres, and the share of the box around it that a frame must not cut off."""
+metres, and the share of the box around it that a frame must not cut off; degrees off the front from which people, and
+what hangs at a wall or is so high, metres, are not recognised."""
 SEEN_THROUGH = ("transparent", "clear", "coloured", "natural")
 """Colour words that tell nothing apart."""
 FLOORS = {1: ("",), 2: ("ground", "upper"), 3: ("ground", "middle", "top")}
@@ -60,13 +63,17 @@ class WalkScene:
         self.kind, self.by, self.rng = "", templates.SPEAKERS[0], np.random.default_rng(0)
         self._called: dict[str, list[Placement]] = {}
         self._nouns: dict[str, str] = {}
-        self.clear = _firsts([o for o in f.clear if recognised(house.placement_by_id[o], f)] for f in walk.frames)
+        seen = lambda o, f: recognised(house.placement_by_id[o], f, self.assets[o].support)
+        self.clear = _firsts([o for o in f.clear if seen(o, f)] for f in walk.frames)
         self.glimpsed = _firsts([o for o, share in f.shares.items() if share >= GLIMPSE] for f in walk.frames)
         self.movable = movable(house, catalogue)
         self.things = [p for p in house.placements if p.id in self.clear and p.object_class not in UNFIT]
         self.things = [p for p in self.things if not UNLIKE & {p.asset, p.object_class}]
-        kinds = [(r.kind, r.storey) for r in house.rooms]
-        self.rooms = {r.id: kind for r, kind in zip(house.rooms, kinds) if kinds.count(kind) == 1}
+        self.things = [p for p in self.things if p.object_class != "book" or not self.carrier_of(p).endswith(" shelf")]
+        largest = max(house.rooms, key=lambda r: "bedroom" in r.kind and house.floor(r).area)
+        same = {"corridor": "hall", **({"main_bedroom": "bedroom"} if largest.kind == "bedroom" else {})}
+        kinds = [(same.get(r.kind, r.kind), r.storey) for r in house.rooms]
+        self.rooms = {r.id: (r.kind, r.storey) for r, kind in zip(house.rooms, kinds) if kinds.count(kind) == 1}
         self.looked_at = [r for r in dict.fromkeys(walk.rooms) if r in self.rooms]
 
     def asked(self, kind: str, rng: np.random.Generator) -> "WalkScene":
@@ -164,20 +171,20 @@ class WalkScene:
           anywhere: names do not say the room.
         """
         shown = [p for p in self.house.placements if p.object_class == CLASS and p.id in self.glimpsed]
-        names, also = dict[str, list[str]](), list[str]()
+        names, every = dict[str, list[str]](), Counter[str]()
+        alike = {person_of(q.asset).id for q in shown} & {*ASKING["lookalikes"]}
         for p in shown:
             person, how = person_of(p.asset), "sitting" if "sitting" in self.assets[p.id].tags else "standing"
             words = [person.noun, f"{how} {person.noun}", person.words]
             words += [f"{person.noun} in the {self.room_name(p.room)}"] if p.room in self.rooms and not anywhere else []
-            names[p.id] = [f"the {w}" for w in words]
-            alike = {person_of(q.asset).id for q in shown} & {*ASKING["lookalikes"]}
+            names[p.id], other = [f"the {w}" for w in words], ASKING["taken_for"].get(person.id)
+            every.update(names[p.id])
+            if other:
+                every.update(name.replace(f" {person.noun}", f" {other}") for name in names[p.id])
+                names[p.id] = names[p.id][2:]
             if person.id in alike and len(alike) > 1:
                 names[p.id] = []
-            if other := ASKING["taken_for"].get(person.id):
-                also += [name.replace(f" {person.noun}", f" {other}") for name in names[p.id]]
-                names[p.id] = names[p.id][2:]
-        every = also + [name for of_one in names.values() for name in of_one]
-        alone = ((p, [n for n in names[p.id] if every.count(n) == 1]) for p in shown if p.id in self.clear)
+        alone = ((p, [n for n in names[p.id] if every[n] == 1]) for p in shown if p.id in self.clear)
         return self.shuffled([(p, of_one[0]) for p, of_one in alone if of_one])
 
     def meant(self, words: str) -> list[Placement]:
@@ -195,15 +202,19 @@ def movable(house: House, catalogue: Catalogue) -> frozenset[str]:
     return loose(house, catalogue) & easily | takeable(house, catalogue)
 
 
-def recognised(p: Placement, frame: WalkFrame) -> bool:
-    """Tells whether a frame that shows a thing clearly shows enough of it to be known, and of a person the head."""
+def recognised(p: Placement, frame: WalkFrame, support: str = "") -> bool:
+    """Tells whether a frame that shows a thing clearly shows enough of it to be known: of people the head, and not from
+    behind; what hangs at a wall, or is high and stands there, not from the side."""
     area, share = outline(p, frame.position, frame.yaw, 9.0), frame.shares[p.id]
+    aside = abs(bearing(middle(p), facing_of(p.yaw), np.array(frame.position[:2])))
     if p.object_class == CLASS:
         x, y, z = p.position
         head = dataclasses.replace(p, position=(x, y, z + p.size[2] - HEAD), size=(*p.size[:2], HEAD))
         inside, whole = (outline(head, frame.position, frame.yaw, edge) for edge in (1.0, 9.0))
-        if inside < HEAD_SHARE * whole:
+        if inside < HEAD_SHARE * whole or aside > FROM_BEHIND:
             return False
+    if aside > OBLIQUE and (support == "wall" or (support == "against_wall" and p.size[2] > HIGH)):
+        return False
     if max(p.size) > FURNITURE:
         return share >= max(FURNITURE_SHARE, OUTLINE_SHARE * area)
     return share >= min(SMALL_SHARE, SMALL_OUTLINE * area)

@@ -38,21 +38,25 @@ SUNNY, SHADY, HIGH, LATER = math.cos(math.radians(50)), math.cos(math.radians(11
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 """Cosines between where a window looks and the sun, at least of a sunny room and at most of others; the least height of
 the sun, the sine; hours that are asked about."""
-STANDS, FROM_WALL, CORNER, STRAIGHT, ROUTES = 1.2, 0.4, 60.0, 25.0, 400
+STANDS, FROM_WALL, CORNER, STRAIGHT, ROUTES, BODY = 1.2, 0.4, 60.0, 25.0, 400, 0.5
 """Metres within which one is at a thing, and from the middle of what stands or hangs at a wall to before it; degrees
-from which a bend of a way is a turn, and below which it is none; ways of a walk that are looked at."""
-FACED, TRIPLES, OFFERED = 1.0, 200, 24
-"""Least metres to what is faced; sets of three things that are looked at; most wrong options to choose from."""
-SETS_OFF, ON_RING, ANOTHER, AS_SHORT = 1.5, 0.1, (60.0, 75.0), (1.15, 0.7)
-"""Metres along a way to where one sets off to, give or take; degrees to a side from which on it is another way, and
-within which it is a detour of the same; how much longer it may be, as a share and in metres, and be as short."""
+from which a bend of a way is a turn, and below which it is none; ways of a walk that are looked at; height up to which
+things with a tap or a headboard are as deep as their box, metres."""
+FACED, TRIPLES, OFFERED, WIDE_OPEN, NOOK = 1.0, 200, 24, 2.0, 2.5
+"""Least metres to what is faced; sets of three things that are looked at; most wrong options to choose from; metres
+from which a passage leaves no border between two rooms, and square metres below which any does."""
+SETS_OFF, ON_RING, LEAST_WAY, AS_SHORT = 1.5, 0.1, 2.0, (1.15, 0.7)
+ANOTHER, NOTHING, RIDGE = 45.0, 30.0, 0.1
+"""Metres along a way to where one sets off to, give or take; of the least way; how much longer another way may be, as a
+share and in metres, and be as short. Degrees to a side from which it is another, if ways between are so many metres
+longer, or there are none for so many degrees."""
 UNDERFOOT, WORKTOPS, BASIN, UNIT = {*ASKING["underfoot"]}, {*ASKING["worktops"]}, "kitchen sink", "sink unit"
 Sides = dict[str, tuple[float, float]]
 """Degrees to the left, from and to."""
 TWO_SIDES: Sides = {"left": (0, 180), "right": (-180, 0)}
 BESIDE: Sides = {"left": (5, 165), "right": (-165, -5)}
 LEFT_RIGHT_BACK: Sides = {"left": (0, 135), "right": (-135, 0), "back": (135, 225)}
-SET_OFF_SIDES: Sides = {"straight on": (-35, 35), "left": (30, 150), "back": (135, 225), "right": (-150, -30)}
+SET_OFF_SIDES: Sides = {"straight on": (-35, 35), "left": (30, 135), "back": (135, 225), "right": (-135, -30)}
 QUARTERS: Sides = {"front-left": (0, 90), "back-left": (90, 180), "back-right": (-180, -90), "front-right": (-90, 0)}
 Asked = Iterator[VqaQuestion]
 QuestionType = Callable[[WalkScene], Asked]
@@ -84,6 +88,12 @@ def before(s: WalkScene, p: Placement) -> np.ndarray:
     return middle(p) + (p.size[1] / 2 + FROM_WALL) * np.array([math.cos(front), math.sin(front)])
 
 
+def is_above(a: Placement, b: Placement) -> bool:
+    """Tells whether one of two things is higher than most of the other, whose box goes up to a tap or a headboard."""
+    low, high = sorted((a, b), key=lambda p: p.position[2])
+    return low.object_class in ASKING["upright"] and high.position[2] > low.position[2] + BODY
+
+
 def sided(
     s: WalkScene, angle: float, sides: Sides, about: Iterable[str], also: Iterable[float] = (), **slots: str
 ) -> Asked:
@@ -109,13 +119,14 @@ def counting(s: WalkScene) -> Asked:
 
 def distance(s: WalkScene) -> Asked:
     for (a, first), (b, second) in groups(s, 2):
-        if LEAST_METRES <= (metres := gap(a, b)) <= MOST_METRES:
+        if not is_above(a, b) and LEAST_METRES <= (metres := gap(a, b)) <= MOST_METRES:
             yield s.ask(f"{metres:.1f}", (a.id, b.id), a=first, b=second)
 
 
 def nearest(s: WalkScene) -> Asked:
     for (a, first), *others in groups(s, 2 + OFFERED, least=1 + OPTIONS):
-        metres, ids, names = zip(*sorted((gap(a, p), p.id, name) for p, name in others))
+        others = [(gap(a, p), p.id, name) for p, name in others if not is_above(a, p)]
+        metres, ids, names = zip(*sorted(others)) if others else ((), (), ())
         for k in s.shuffled(range(len(ids) - OPTIONS + 1))[:2]:
             if metres[k + 1] > max(NEARER * metres[k], metres[k] + NEARER_METRES):
                 fact = f"{metres[k]:.1f} m, others at least {metres[k + 1]:.1f} m"
@@ -129,7 +140,10 @@ def size(s: WalkScene) -> Asked:
 
 def room_size(s: WalkScene) -> Asked:
     areas = {r: s.house.floor(s.house.room_by_id[r]).area for r in s.looked_at}
-    yield from (s.ask(f"{areas[r]:.1f}", (r,), room=s.room_name(r)) for r in s.shuffled(s.looked_at))
+    passages = [(o.rooms, math.dist(o.a, o.b)) for o in s.house.openings if o.leaf_finish is None]
+    open_by = {r: max((width for rooms, width in passages if r in rooms), default=0.0) for r in areas}
+    closed = [r for r in s.looked_at if open_by[r] < WIDE_OPEN and not (open_by[r] and areas[r] < NOOK)]
+    yield from (s.ask(f"{areas[r]:.1f}", (r,), room=s.room_name(r)) for r in s.shuffled(closed))
 
 
 def turned(sides: Sides) -> QuestionType:
@@ -148,6 +162,8 @@ def turned(sides: Sides) -> QuestionType:
                         for eye in (middle(a), edge, before(s, a))
                         for at in (middle(c), *(corners(c) + middle(c)) / 2)
                     )
+                    faced = (direction(middle(a), at) for at in (corners(b) + middle(b)) / 2)
+                    also += [bearing(middle(a), ahead, middle(c)) for ahead in faced]
                     asked = sided(s, angle, sides, (a.id, b.id, c.id), also, a=first, b=second, c=third)
                     questions |= {q.answer: q for q in asked}
             mirror = lambda side: "right".join(x.replace("right", "left") for x in side.split("left"))
@@ -282,10 +298,12 @@ def sun(s: WalkScene) -> Asked:
         sunny = [r for r in s.looked_at if any(room == r and cosine > SUNNY for room, cosine in windows)]
         shady = [r for r in s.looked_at if any(room == r for room, _ in windows)]
         shady = [r for r in shady if all(cosine < SHADY for o, cosine in lit if o.rooms[0] == r)]
-        for room in sunny if shady and towards[2] > HIGH else ():
-            about = (room, *shady[:3])
+        for room in sunny if towards[2] > HIGH else ():
+            lit_through = {r for o in s.house.openings if o.leaf_finish is None and room in o.rooms for r in o.rooms}
+            about = (room, *[r for r in shady if r not in lit_through][:3])
             names = [s.room_name(r) for r in about]
-            yield s.ask(names[0], about, names[1:], f"at {hour:.0f}:00", looks=looks, hour=f"{hour:.0f}")
+            if names[1:]:
+                yield s.ask(names[0], about, names[1:], f"at {hour:.0f}:00", looks=looks, hour=f"{hour:.0f}")
 
 
 def next_step(s: WalkScene) -> Asked:
@@ -298,29 +316,30 @@ def next_step(s: WalkScene) -> Asked:
         if len(there):
             goal = there[np.linalg.norm(ground.xyz[there, :2] - middle(t), axis=1).argmin()]
             way = ground.xyz[ground.wide_ways(np.array([goal])).cells(ground.cell_at(feet))]
-            ahead = shapely.LineString(np.concatenate([[feet], way])[:, :2]).interpolate(SETS_OFF)
-            angle = bearing(feet[:2], last.yaw, np.array(ahead.coords[0]))
+            line = shapely.LineString(np.concatenate([[feet], way])[:, :2])
+            angle = bearing(feet[:2], last.yaw, np.array(line.interpolate(SETS_OFF).coords[0]))
             shortest, *others = (math.degrees(wrap(x - last.yaw)) for x in set_offs(ground, feet, int(goal)))
-            if side_of(angle, SET_OFF_SIDES) == side_of(shortest, SET_OFF_SIDES):
+            if line.length > LEAST_WAY and side_of(angle, SET_OFF_SIDES) == side_of(shortest, SET_OFF_SIDES):
                 yield from sided(s, angle, SET_OFF_SIDES, (t.id,), others, a=name)
 
 
 def set_offs(ground: FloorWays, feet: np.ndarray, goal: int) -> list[float]:
     """Radians in which the shortest way to a cell sets off, and then another to another side that is as short, if there
-    is one: of all places SETS_OFF away on such a way, it leads over one that is none beside the shortest way."""
+    is one: by the lengths of the ways over all places that are SETS_OFF away, which have more than one valley."""
     here = ground.ways(np.array([ground.cell_at(feet)])).metres
     ring = np.flatnonzero(np.abs(here - SETS_OFF) < ON_RING)
-    metres = here[ring] + ground.ways(np.array([goal])).metres[ring]
     if not len(ring):
         return [direction(feet[:2], ground.xyz[goal, :2])]
-    away = np.array([direction(feet[:2], at) for at in ground.xyz[ring, :2]])
-    first = int(metres.argmin())
-    off = np.degrees(np.abs(wrap(away - away[first])))
-    short = metres < max(AS_SHORT[0] * metres[first], metres[first] + AS_SHORT[1])
-    aside = np.where((off > ANOTHER[0]) & short, metres, np.inf)
-    second = int(aside.argmin())
-    is_another = bool(aside[second] < np.inf and off[second] > ANOTHER[1])
-    return away[[first, second][: 1 + is_another]].tolist()
+    metres = here[ring] + ground.ways(np.array([goal])).metres[ring]
+    away, first = np.array([direction(feet[:2], at) for at in ground.xyz[ring, :2]]), int(metres.argmin())
+    signed, ridge, none = np.degrees(wrap(away - away[first])), metres.copy(), np.zeros(len(ring))
+    for side in (signed >= 0, signed <= 0):
+        outwards = np.flatnonzero(side)[np.argsort(np.abs(signed[side]))]
+        ridge[outwards] = np.maximum.accumulate(metres[outwards])
+        none[outwards] = np.maximum.accumulate(np.diff(np.abs(signed[outwards]), prepend=0.0))
+    far = (np.abs(signed) > ANOTHER) & ((metres < ridge - RIDGE) | (none > NOTHING))
+    short = far & (metres < max(AS_SHORT[0] * metres[first], metres[first] + AS_SHORT[1]))
+    return away[[first, *([int(np.where(short, metres, np.inf).argmin())] if short.any() else [])]].tolist()
 
 
 @functools.lru_cache(4)
