@@ -14,9 +14,10 @@ import numpy as np
 import shapely
 from shapely.ops import nearest_points, substring
 
+from embodied.assets.moving_parts import openness_of
 from embodied.datasets.vqa.scene import ALIKE, ASKING, WalkScene, bearing, direction, gap, middle
 from embodied.datasets.vqa.scoring import OPTIONS, VqaQuestion
-from embodied.datasets.vqa.walks import CLEAR_SHARE
+from embodied.datasets.vqa.walks import AJAR, CLEAR_SHARE
 from embodied.geometry import facing_of, wrap
 from embodied.house.house import HINGED, House, Placement
 from embodied.house.shapes import footprint, inward
@@ -63,9 +64,10 @@ QuestionType = Callable[[WalkScene], Asked]
 
 
 def groups(s: WalkScene, most: int, least: int = 2) -> Iterator[list[tuple[Placement, str]]]:
-    """Things of one room with names, in groups."""
+    """Things of one room with names, in groups; without those whose doors stand out of their boxes, and curtains."""
+    out = lambda p: p.object_class == HALVED or max(openness_of(p.params).values(), default=0.0) > AJAR
     for room in s.shuffled(s.looked_at):
-        things = s.named(s.in_room(room))
+        things = s.named([p for p in s.in_room(room) if not out(p)])
         for k in range(len(things) if len(things) >= least else 0):
             yield [*things[k:], *things[:k]][:most]
 
@@ -220,7 +222,8 @@ def carried(shelf: bool) -> QuestionType:
             for p in s.shuffled(there) if len(away) > 2 else ():
                 wrong = s.shuffled(sorted(away))[:OFFERED]
                 fact = f"on it: {', '.join(sorted(classes))}"
-                yield s.ask(s.noun(p.object_class), (carrier.id, p.id), map(s.noun, wrong), fact, a=name)
+                what = name.replace(BASIN, UNIT) if shelf else name
+                yield s.ask(s.noun(p.object_class), (carrier.id, p.id), map(s.noun, wrong), fact, a=what)
 
     return asked
 
@@ -275,7 +278,10 @@ def seen_by(s: WalkScene) -> Asked:
         ahead = [t for t in here if seen.get(t.id, 0.0) > CLEAR_SHARE and gap(p, t) > FROM_WALL]
         ahead = [t for t in ahead if abs(bearing(middle(p), facing_of(p.yaw), middle(t))) < AHEAD]
         wrong = [(q, n) for q, n in wrong if q.parent not in {t.id for t in ahead}]
-        for t, right in s.named(ahead)[: len(wrong) > 1]:
+        mirrored = any(
+            "mirror" in {q.object_class, *ASKING["parts"].get(q.object_class, ())} for q in here if q.id in seen
+        )
+        for t, right in s.named(ahead)[: len(wrong) > 1 and not mirrored]:
             yield s.ask(right, (p.id, t.id, *(q.id for q, _ in wrong)), [n for _, n in wrong], a=name)
 
 
