@@ -43,8 +43,8 @@ FROM_BEHIND, OBLIQUE, HIGH = 120.0, 65.0, 1.4
 """Shares of a frame, or else of its outline, at which a small thing is recognised; height of a head with its hair,
 metres, and the share of the box around it that a frame must not cut off; degrees off the front from which people, and
 what hangs at a wall or is so high, metres, are not recognised."""
-BEDROOMS, LARGER = ("main_bedroom", "bedroom"), 1.2
-"""Kinds of room, and by how much the first is larger than the others if people know it."""
+LARGER = 1.2
+"""How many times larger than other bedrooms the main one is if people know it."""
 SEEN_THROUGH = ("transparent", "clear", "coloured", "natural")
 """Colour words that tell nothing apart."""
 FLOORS = {1: ("",), 2: ("ground", "upper"), 3: ("ground", "middle", "top")}
@@ -72,10 +72,9 @@ class WalkScene:
         self.things = [p for p in house.placements if p.id in self.clear and p.object_class not in UNFIT]
         self.things = [p for p in self.things if not UNLIKE & {p.asset, p.object_class}]
         self.things = [p for p in self.things if p.object_class != "book" or not self.carrier_of(p).endswith(" shelf")]
-        beds = {
-            kind: max((house.floor(r).area for r in house.rooms if r.kind == kind), default=0.0) for kind in BEDROOMS
-        }
-        same = {"corridor": "hall", **(dict([BEDROOMS]) if beds[BEDROOMS[0]] < LARGER * beds[BEDROOMS[1]] else {})}
+        area = lambda kind: max((house.floor(r).area for r in house.rooms if r.kind == kind), default=0.0)
+        is_main = area("main_bedroom") > LARGER * area("bedroom")
+        same = {"corridor": "hall"} if is_main else {"corridor": "hall", "main_bedroom": "bedroom"}
         kinds = [(same.get(r.kind, r.kind), r.storey) for r in house.rooms]
         self.rooms = {r.id: (r.kind, r.storey) for r, kind in zip(house.rooms, kinds) if kinds.count(kind) == 1}
         self.looked_at = [r for r in dict.fromkeys(walk.rooms) if r in self.rooms]

@@ -278,9 +278,7 @@ def seen_by(s: WalkScene) -> Asked:
         ahead = [t for t in here if seen.get(t.id, 0.0) > CLEAR_SHARE and gap(p, t) > FROM_WALL]
         ahead = [t for t in ahead if abs(bearing(middle(p), facing_of(p.yaw), middle(t))) < AHEAD]
         wrong = [(q, n) for q, n in wrong if q.parent not in {t.id for t in ahead}]
-        mirrored = any(
-            "mirror" in {q.object_class, *ASKING["parts"].get(q.object_class, ())} for q in here if q.id in seen
-        )
+        mirrored = any(s.house.placement_by_id[i].object_class == "mirror" for i in seen)
         for t, right in s.named(ahead)[: len(wrong) > 1 and not mirrored]:
             yield s.ask(right, (p.id, t.id, *(q.id for q, _ in wrong)), [n for _, n in wrong], a=name)
 
