@@ -39,7 +39,7 @@ LEAST_MOVED = 0.3
 FURNITURE, FURNITURE_SHARE, OUTLINE_SHARE = 0.5, 0.015, 0.25
 """Longest side of furniture, metres, and the shares of a frame and of its outline at which it is recognised."""
 SMALL_SHARE, SMALL_OUTLINE, HEAD, HEAD_SHARE = 0.008, 0.5, 0.22, 0.7
-FROM_BEHIND, OBLIQUE, HIGH = 120.0, 65.0, 1.4
+FROM_BEHIND, OBLIQUE, HIGH = 120.0, 65.0, 1.15
 """Shares of a frame, or else of its outline, at which a small thing is recognised; height of a head with its hair,
 metres, and the share of the box around it that a frame must not cut off; degrees off the front from which people, and
 what hangs at a wall or is so high, metres, are not recognised."""
@@ -71,7 +71,8 @@ class WalkScene:
         self.movable = movable(house, catalogue)
         self.things = [p for p in house.placements if p.id in self.clear and p.object_class not in UNFIT]
         self.things = [p for p in self.things if not UNLIKE & {p.asset, p.object_class}]
-        self.things = [p for p in self.things if p.object_class != "book" or not self.carrier_of(p).endswith(" shelf")]
+        is_odd = lambda p: self.carrier_of(p).endswith(ASKING["out_of_place"].get(p.object_class, "-"))
+        self.things = [p for p in self.things if not is_odd(p)]
         area = lambda kind: max((house.floor(r).area for r in house.rooms if r.kind == kind), default=0.0)
         is_main = area("main_bedroom") > LARGER * area("bedroom")
         same = {"corridor": "hall"} if is_main else {"corridor": "hall", "main_bedroom": "bedroom"}

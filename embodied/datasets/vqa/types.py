@@ -17,7 +17,7 @@ from shapely.ops import nearest_points, substring
 from embodied.assets.moving_parts import openness_of
 from embodied.datasets.vqa.scene import ALIKE, ASKING, WalkScene, bearing, direction, gap, middle
 from embodied.datasets.vqa.scoring import OPTIONS, VqaQuestion
-from embodied.datasets.vqa.walks import AJAR, CLEAR_SHARE
+from embodied.datasets.vqa.walks import AJAR, CLEAR_SHARE, outline
 from embodied.geometry import facing_of, wrap
 from embodied.house.house import HINGED, House, Placement
 from embodied.house.shapes import footprint, inward
@@ -43,6 +43,8 @@ STANDS, FROM_WALL, CORNER, STRAIGHT, ROUTES, BODY = 1.2, 0.4, 60.0, 25.0, 400, 0
 """Metres within which one is at a thing, and from the middle of what stands or hangs at a wall to before it; degrees
 from which a bend of a way is a turn, and below which it is none; ways of a walk that are looked at; height up to which
 things with a tap or a headboard are as deep as their box, metres."""
+SHOWN, UNCUT = 0.4, 0.95
+"""Shares of the outline of a thing whose size is asked for that a frame shows, and does not cut off."""
 FACED, TRIPLES, OFFERED, WIDE_OPEN, NOOK = 1.0, 200, 24, 2.0, 2.5
 """Least metres to what is faced; sets of three things that are looked at; most wrong options to choose from; metres
 from which a passage leaves no border between two rooms, and square metres below which any does."""
@@ -136,7 +138,11 @@ def nearest(s: WalkScene) -> Asked:
 
 
 def size(s: WalkScene) -> Asked:
+    """Of things that a frame shows from end to end."""
+    area = lambda p, f, edge: outline(p, f.position, f.yaw, edge)
+    whole = lambda p, f: f.shares[p.id] > SHOWN * area(p, f, 1.0) > SHOWN * UNCUT * area(p, f, 9.0)
     things = [p for p in s.things if p.object_class not in ASKING["oversized"]]
+    things = [p for p in things if any(whole(p, f) for f in s.walk.frames if p.id in f.clear)]
     yield from (s.ask(f"{100 * max(p.size):.0f}", (p.id,), a=name) for p, name in s.named(things))
 
 
@@ -348,7 +354,9 @@ def set_offs(ground: FloorWays, feet: np.ndarray, goal: int) -> list[float]:
 
 @functools.lru_cache(4)
 def _ground(house: House) -> FloorWays:
-    return FloorWays(lived_in(house))
+    house = lived_in(house)
+    firm = tuple(p for p in house.placements if p.object_class != HALVED)
+    return FloorWays(dataclasses.replace(house, placements=firm))
 
 
 def is_leg(s: WalkScene, floor: shapely.Geometry, a: Placement, b: Placement) -> bool:
