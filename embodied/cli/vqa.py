@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import itertools
+import textwrap
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -19,8 +20,9 @@ if TYPE_CHECKING:
     from embodied.datasets.vqa.build import VqaData
     from embodied.datasets.vqa.scoring import VqaQuestion
 
-VQA, DEFAULT_HOUSES, PER_HOUSE, TOGETHER = "vqa", {"train": 40, "test": 10}, 200, 32
-"""Houses of the splits, and questions of a house, unless options say otherwise; questions sent at a time."""
+VQA, DEFAULT_HOUSES, PER_HOUSE, TOGETHER, WRAPPED = "vqa", {"train": 40, "test": 10}, 200, 32, 210
+"""Houses of the splits, and questions of a house, unless options say otherwise; questions sent at a time; letters of a
+line of a sheet."""
 COLOURS = ((40, 40, 255), (60, 200, 60), (255, 120, 30), (0, 210, 255), (230, 60, 230), (255, 255, 0))
 """BGR of the outline of the first thing that a question is about, the second, ..."""
 
@@ -129,13 +131,14 @@ def judged(args: EvaluateOptions, data: VqaData, asked: Sequence[VqaQuestion]) -
 
 
 def answered(args: EvaluateOptions, data: VqaData, questions: Sequence[VqaQuestion]) -> Iterator[str]:
-    """Answers of a language model, which is shown --frames frames; '' where its answer is none."""
+    """Answers of a language model, which is shown --frames frames; what it said where that is no JSON."""
     from embodied.agents.language_models.client import client_of
     from embodied.agents.language_models.completions import object_schema
     from embodied.agents.language_models.prompts import read_prompt
     from embodied.datasets.vqa.scoring import LETTERS
 
     client, prompt, left = client_of(args), read_prompt("vqa", ("question",), args.prompts), iter(questions)
+    plain = 0
     url = lambda file: "data:image/jpeg;base64," + base64.b64encode(file.read_bytes()).decode()
     while group := [*itertools.islice(left, TOGETHER)]:
         asked = []
@@ -144,8 +147,12 @@ def answered(args: EvaluateOptions, data: VqaData, questions: Sequence[VqaQuesti
             says = {"enum": [*LETTERS[: len(q.options)]]} if q.options else {"maxLength": 20}
             schema = object_schema(answer={"type": "string", **says})
             asked.append((prompt.messages(frames, question=q.prompt), schema))
-        yield from ("" if a.value is None else str(a.value["answer"]) for a in client.ask_all(asked))
+        for a in client.ask_all(asked):
+            plain += a.value is None
+            yield a.text if a.value is None else str(a.value["answer"])
     note(f"{client.sent} requests were sent; all other answers were in {args.answers}")
+    if plain:
+        note(f"{plain} answers of {len(questions)} were no JSON as it was asked for, and are read as they are")
 
 
 def look(args: ViewOptions) -> None:
@@ -180,7 +187,7 @@ def sheet(data: VqaData, question: VqaQuestion, columns: int = 4, line: int = 24
     outlined = [(name, number[name], c) for name, c in zip(question.about, COLOURS) if name in number]
     ids = [read_frame(f.with_suffix(".png"), cv2.IMREAD_UNCHANGED) for f in files]
     best = {max(range(len(ids)), key=lambda k: (ids[k] == i).sum()) for _, i, _ in outlined}
-    say = lambda on, text, x, y, colour=(0, 0, 0): cv2.putText(on, text[:230], (x, y), 0, 0.5, colour, 1, cv2.LINE_AA)
+    say = lambda on, text, x, y, colour=(0, 0, 0): cv2.putText(on, text, (x, y), 0, 0.5, colour, 1, cv2.LINE_AA)
     pictures = []
     for k in sorted(best | {*np.linspace(0, len(files) - 1, columns).astype(int).tolist()}):
         picture = say(read_frame(files[k]), str(k), 6, 352, (255, 255, 255))
@@ -189,10 +196,12 @@ def sheet(data: VqaData, question: VqaQuestion, columns: int = 4, line: int = 24
             cv2.drawContours(picture, edges, -1, colour, 2)
         pictures.append(picture)
     pictures += [np.full_like(pictures[0], 255)] * (-len(pictures) % columns)
-    head = np.full((4 * line + 8, columns * pictures[0].shape[1], 3), 255, np.uint8)
     options = "   ".join(question.prompt.split("\n")[2:-1])
-    for k, text in enumerate((f"{question.id}: {question.text}", options, f"{question.letter}   {question.fact}"), 1):
+    said = (f"{question.id}: {question.text}", options, f"{question.letter}   {question.fact}")
+    lines = [part for text in said for part in textwrap.wrap(text, WRAPPED) or [""]]
+    head = np.full(((len(lines) + 1) * line + 8, columns * pictures[0].shape[1], 3), 255, np.uint8)
+    for k, text in enumerate(lines, 1):
         say(head, text, 8, line * k)
     for k, (name, _, colour) in enumerate(outlined):
-        say(head, name, 8 + 300 * k, 4 * line, colour)
+        say(head, name, 8 + 300 * k, (len(lines) + 1) * line, colour)
     return np.vstack([head, *(np.hstack(pictures[i : i + columns]) for i in range(0, len(pictures), columns))])

@@ -105,7 +105,8 @@ def sided(
     the angles of its parts, are on that side."""
     side = side_of(angle, sides)
     if side and all(side_of(x, sides, 0.0) == side for x in also):
-        yield s.ask(side, about, [x for x in sides if x != side], f"{angle:.0f} degrees to the left", **slots)
+        fact = f"{abs(angle):.0f} degrees to the {'left' if angle > 0 else 'right'}"
+        yield s.ask(side, about, [x for x in sides if x != side], fact, **slots)
 
 
 def counting(s: WalkScene) -> Asked:
@@ -227,7 +228,7 @@ def carried(shelf: bool) -> QuestionType:
             away = {p.object_class for p in small} - alike - {*ASKING["parts"].get(carrier.object_class, ())}
             for p in s.shuffled(there) if len(away) > 2 else ():
                 wrong = s.shuffled(sorted(away))[:OFFERED]
-                fact = f"on it: {', '.join(sorted(classes))}"
+                fact = f"{'in' if shelf else 'on'} it: {', '.join(sorted(classes))}"
                 what = name.replace(BASIN, UNIT) if shelf else name
                 yield s.ask(s.noun(p.object_class), (carrier.id, p.id), map(s.noun, wrong), fact, a=what)
 
