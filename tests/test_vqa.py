@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from conftest import two_rooms
-from hand_chat import ChatServer, first_allowed
+from hand_chat import ChatServer, first_allowed, said
 
 from embodied.agents.vision.answers import strip_of_frames
 from embodied.assets.catalogue import load_catalogue
@@ -330,6 +330,14 @@ def test_the_command_makes_questions_about_what_the_frames_show(tmp_path, capsys
     table = json.loads(capsys.readouterr().out)
     nearest = [q.letter == "A" for q in questions if q.type == "object_rel_distance"]  # whoever always says A
     assert table["scores"]["llm"][table["types"].index("object_rel_distance")] == pytest.approx(np.mean(nearest))
+    plain = [*llm[:-1], str(tmp_path / "plain.sqlite")]
+    with ChatServer(lambda _: said("B.")) as server:
+        assert main([*plain, "--base-url", server.url]) == 0
+    shown = capsys.readouterr()
+    second = [q.letter == "B" for q in questions if q.type == "object_rel_distance"]
+    scores = json.loads(shown.out)["scores"]["llm"]
+    assert scores[table["types"].index("object_rel_distance")] == pytest.approx(np.mean(second))
+    assert f"{len(questions)} answers of {len(questions)} were no JSON" in shown.err
     assert {*table["scores"]} == {"chance", "llm", "network", *BLIND} and table["types"] == [
         *dict.fromkeys(q.type for q in questions)
     ]
@@ -361,5 +369,5 @@ def test_the_command_makes_questions_about_what_the_frames_show(tmp_path, capsys
     assert len(sat[0]["image_bytes"]) == 8
     history = json.loads((tmp_path / "openeqa/open-eqa-test.json").read_text())[0]["episode_history"]
     assert [*(tmp_path / "openeqa/frames" / history).glob("*-rgb.png")]
-    said = json.loads((tmp_path / "llava/test.jsonl").read_text().splitlines()[0])["conversations"]
-    assert said[0]["value"].startswith("<image>") and said[1]["value"] == questions[0].letter
+    turns = json.loads((tmp_path / "llava/test.jsonl").read_text().splitlines()[0])["conversations"]
+    assert turns[0]["value"].startswith("<image>") and turns[1]["value"] == questions[0].letter

@@ -197,8 +197,8 @@ def sheet(data: VqaData, question: VqaQuestion, columns: int = 4, line: int = 24
         pictures.append(picture)
     pictures += [np.full_like(pictures[0], 255)] * (-len(pictures) % columns)
     options = "   ".join(question.prompt.split("\n")[2:-1])
-    said = (f"{question.id}: {question.text}", options, f"{question.letter}   {question.fact}")
-    lines = [part for text in said for part in textwrap.wrap(text, WRAPPED) or [""]]
+    texts = (f"{question.id}: {question.text}", options, f"{question.letter}   {question.fact}")
+    lines = [part for text in texts for part in textwrap.wrap(text, WRAPPED) or [""]]
     head = np.full(((len(lines) + 1) * line + 8, columns * pictures[0].shape[1], 3), 255, np.uint8)
     for k, text in enumerate(lines, 1):
         say(head, text, 8, line * k)

@@ -39,11 +39,11 @@ SUNNY, SHADY, HIGH, LATER = math.cos(math.radians(50)), math.cos(math.radians(11
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 """Cosines between where a window looks and the sun, at least of a sunny room and at most of others; the least height of
 the sun, the sine; hours that are asked about."""
-STANDS, FROM_WALL, CORNER, STRAIGHT, ROUTES, BODY = 1.2, 0.4, 60.0, 25.0, 400, 0.5
+STANDS, FROM_WALL, CORNER, STRAIGHT, ROUTES, BOXED = 1.2, 0.4, 60.0, 25.0, 400, 0.5
 """Metres within which one is at a thing, and from the middle of what stands or hangs at a wall to before it; degrees
 from which a bend of a way is a turn, and below which it is none; ways of a walk that are looked at; height up to which
 things with a tap or a headboard are as deep as their box, metres."""
-SHOWN, UNCUT = 0.4, 0.95
+IN_FRAME, UNCUT = 0.4, 0.95
 """Shares of the outline of a thing whose size is asked for that a frame shows, and does not cut off."""
 FACED, TRIPLES, OFFERED, WIDE_OPEN, NOOK = 1.0, 200, 24, 2.0, 2.5
 """Least metres to what is faced; sets of three things that are looked at; most wrong options to choose from; metres
@@ -95,7 +95,7 @@ def before(s: WalkScene, p: Placement) -> np.ndarray:
 def is_above(a: Placement, b: Placement) -> bool:
     """Tells whether one of two things is higher than most of the other, whose box goes up to a tap or a headboard."""
     low, high = sorted((a, b), key=lambda p: p.position[2])
-    return low.object_class in ASKING["upright"] and high.position[2] > low.position[2] + BODY
+    return low.object_class in ASKING["upright"] and high.position[2] > low.position[2] + BOXED
 
 
 def sided(
@@ -141,7 +141,7 @@ def nearest(s: WalkScene) -> Asked:
 def size(s: WalkScene) -> Asked:
     """Of things that a frame shows from end to end."""
     area = lambda p, f, edge: outline(p, f.position, f.yaw, edge)
-    whole = lambda p, f: f.shares[p.id] > SHOWN * area(p, f, 1.0) > SHOWN * UNCUT * area(p, f, 9.0)
+    whole = lambda p, f: f.shares[p.id] > IN_FRAME * area(p, f, 1.0) > IN_FRAME * UNCUT * area(p, f, 9.0)
     things = [p for p in s.things if p.object_class not in ASKING["oversized"]]
     things = [p for p in things if any(whole(p, f) for f in s.walk.frames if p.id in f.clear)]
     yield from (s.ask(f"{100 * max(p.size):.0f}", (p.id,), a=name) for p, name in s.named(things))
