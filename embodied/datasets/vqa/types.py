@@ -130,8 +130,8 @@ def distance(s: WalkScene) -> Asked:
 
 def nearest(s: WalkScene) -> Asked:
     for (a, first), *others in groups(s, 2 + OFFERED, least=1 + OPTIONS):
-        others = [(gap(a, p), p.id, name) for p, name in others if not is_above(a, p)]
-        metres, ids, names = zip(*sorted(others)) if others else ((), (), ())
+        by_gap = sorted((gap(a, p), p.id, name) for p, name in others if not is_above(a, p))
+        metres, ids, names = zip(*by_gap) if by_gap else ((), (), ())
         for k in s.shuffled(range(len(ids) - OPTIONS + 1))[:2]:
             if metres[k + 1] > max(NEARER * metres[k], metres[k] + NEARER_METRES):
                 fact = f"{metres[k]:.1f} m, others at least {metres[k + 1]:.1f} m"
