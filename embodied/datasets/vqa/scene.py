@@ -31,6 +31,7 @@ ASKING: Mapping[str, Any] = read_toml(Path(templates.__file__).with_name("vqa.to
 """Type to habit to templates; and 'alike', groups of classes that people do not tell apart, 'unsaid', synonyms that
 mislead, 'parts', classes that may be seen in others, and further classes that vqa.toml explains."""
 ALIKE: Mapping[str, list[str]] = {name: group for group in ASKING["alike"] for name in group}
+SAME_COLOUR: Mapping[str, list[str]] = {name: group for group in ASKING["same_colour"] for name in group}
 UNLIKE = {*ASKING["unlike"]}
 """Classes and assets that look like other things: nothing is asked about them."""
 EASILY_MOVED = ("chair", "stool", "plant", "basket", "box", "bag", "table", "toy", "horse", "suitcase", "stand", " bin")
@@ -158,7 +159,8 @@ class WalkScene:
                 word = Word(p.object_class, tuple(w for w in word.adjectives if w not in p.object_class.split()))
             colours = () if p.object_class in ASKING["colourless"] else self.assets[p.id].colours
             word = Word(word.noun, tuple(w for w in word.adjectives if w in colours and w not in SEEN_THROUGH))
-            meant = self.meant(str(word))
+            like = [Word(word.noun, (c,)) for w in word.adjectives for c in SAME_COLOUR.get(w, ()) if c != w]
+            meant = [q for k, w in enumerate((word, *like)) for q in self.meant(str(w)) if not k or q != p]
             if with_article(word.noun).startswith("some "):
                 return None  # plural in form: no question agrees with it
             if meant == [p]:
