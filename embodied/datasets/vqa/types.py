@@ -28,17 +28,18 @@ from embodied.navigation.floor_ways import FloorWays
 from embodied.navigation.free_space import sight_floor
 from embodied.people.day import lived_in
 
-SIDE = 15.0
-"""Degrees from the border between two sides within which nothing is asked."""
+SIDE, FIRST_SIDE = 15.0, 10.0
+"""Degrees from the border between two sides within which nothing is asked; from that of the first steps of a way."""
 LEAST_METRES, MOST_METRES, NEARER, NEARER_METRES = 0.5, 8.0, 1.25, 0.3
 """Between things whose distance is asked for; how much farther the second nearest thing is than the nearest."""
 AHEAD, BEHIND, NEXT_TO, HALVED, TRIES = 60.0, 95.0, 0.5, "curtain", 6
 """Degrees off their way up to which people see things, and from which they do not; metres within which what is not on
 something might be taken to be; a class whose halves people count; times that a thing is asked about with others."""
-SUNNY, SHADY, HIGH, LATER = math.cos(math.radians(50)), math.cos(math.radians(115)), 0.15, (7.0, 9.0, 15.0, 17.0, 19.0)
+SUNNY, LIGHT, SHADY = (math.cos(math.radians(degrees)) for degrees in (50, 70, 115))
+HIGH, LATER = 0.15, (7.0, 9.0, 15.0, 17.0, 19.0)
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
-"""Cosines between where a window looks and the sun, at least of a sunny room and at most of others; the least height of
-the sun, the sine; hours that are asked about."""
+"""Cosines between where a window looks and the sun, at least of a sunny room, of one whose light may reach through a
+passage, and at most of others; the least height of the sun, the sine; hours that are asked about."""
 STANDS, FROM_WALL, CORNER, STRAIGHT, ROUTES, BOXED = 1.2, 0.4, 60.0, 25.0, 400, 0.5
 """Metres within which one is at a thing, and from the middle of what stands or hangs at a wall to before it; degrees
 from which a bend of a way is a turn, and below which it is none; ways of a walk that are looked at; height up to which
@@ -47,7 +48,7 @@ IN_FRAME, UNCUT = 0.4, 0.95
 """Shares of the outline of a thing whose size is asked for that a frame shows, and does not cut off."""
 FACED, TRIPLES, OFFERED, WIDE_OPEN, NOOK = 1.0, 200, 24, 2.0, 2.5
 """Least metres to what is faced; sets of three things that are looked at; most wrong options to choose from; metres
-from which a passage leaves no border between two rooms, and square metres below which any does."""
+from which a passage leaves no border between two rooms, and square metres below which frames show too little."""
 SETS_OFF, ON_RING, LEAST_WAY, AS_SHORT = 1.5, 0.1, 2.0, (1.15, 0.7)
 ANOTHER, NOTHING, RIDGE = 45.0, 30.0, 0.1
 """Metres along a way to where one sets off to, give or take; of the least way; how much longer another way may be, as a
@@ -117,7 +118,7 @@ def counting(s: WalkScene) -> Asked:
         there = {p.id: p.object_class for p in s.called(noun) if (p.room == room if room else p.id in s.glimpsed)}
         for words, kinds in {plural(noun): {name}, **together}.items() if plural(noun) != noun else ():
             alone = {*there.values()} <= kinds and there.keys() <= {p.id for p in s.things}
-            if 2 <= len(there) <= 12 and alone and not kinds & {HALVED, *parts, *WORKTOPS}:
+            if 2 <= len(there) <= 12 and alone and not kinds & {HALVED, *parts, *WORKTOPS, *ASKING["joined"]}:
                 where = s.room_name(room) if room else "video"
                 yield s.ask(str(len(there)), (room, *there), things=words, room=where)
 
@@ -142,7 +143,7 @@ def size(s: WalkScene) -> Asked:
     """Of things that a frame shows from end to end."""
     area = lambda p, f, edge: outline(p, f.position, f.yaw, edge)
     whole = lambda p, f: f.shares[p.id] > IN_FRAME * area(p, f, 1.0) > IN_FRAME * UNCUT * area(p, f, 9.0)
-    things = [p for p in s.things if p.object_class not in ASKING["oversized"]]
+    things = [p for p in s.things if p.object_class not in {*ASKING["oversized"], *WORKTOPS}]
     things = [p for p in things if any(whole(p, f) for f in s.walk.frames if p.id in f.clear)]
     yield from (s.ask(f"{100 * max(p.size):.0f}", (p.id,), a=name) for p, name in s.named(things))
 
@@ -151,7 +152,7 @@ def room_size(s: WalkScene) -> Asked:
     areas = {r: s.house.floor(s.house.room_by_id[r]).area for r in s.looked_at}
     passages = [(o.rooms, math.dist(o.a, o.b)) for o in s.house.openings if o.leaf_finish is None]
     open_by = {r: max((width for rooms, width in passages if r in rooms), default=0.0) for r in areas}
-    closed = [r for r in s.looked_at if open_by[r] < WIDE_OPEN and not (open_by[r] and areas[r] < NOOK)]
+    closed = [r for r in s.looked_at if open_by[r] < WIDE_OPEN and areas[r] > NOOK]
     yield from (s.ask(f"{areas[r]:.1f}", (r,), room=s.room_name(r)) for r in s.shuffled(closed))
 
 
@@ -309,12 +310,14 @@ def sun(s: WalkScene) -> Asked:
         sunny = [r for r in s.looked_at if any(room == r and cosine > SUNNY for room, cosine in windows)]
         shady = [r for r in s.looked_at if any(room == r for room, _ in windows)]
         shady = [r for r in shady if all(cosine < SHADY for o, cosine in lit if o.rooms[0] == r)]
-        for room in sunny if towards[2] > HIGH else ():
-            lit_through = {r for o in s.house.openings if o.leaf_finish is None and room in o.rooms for r in o.rooms}
-            about = (room, *[r for r in shady if r not in lit_through][:3])
+        bright = {o.rooms[0] for o, cosine in lit if cosine > LIGHT}
+        passages = (o.rooms for o in s.house.openings if o.leaf_finish is None)
+        lit_through = {r for rooms in passages for r in rooms if bright & {*rooms}}
+        shady = [r for r in shady if r not in lit_through]
+        for room in sunny if shady and towards[2] > HIGH else ():
+            about = (room, *shady[:3])
             names = [s.room_name(r) for r in about]
-            if names[1:]:
-                yield s.ask(names[0], about, names[1:], f"at {hour:.0f}:00", looks=looks, hour=f"{hour:.0f}")
+            yield s.ask(names[0], about, names[1:], f"at {hour:.0f}:00", looks=looks, hour=f"{hour:.0f}")
 
 
 def next_step(s: WalkScene) -> Asked:
@@ -328,9 +331,12 @@ def next_step(s: WalkScene) -> Asked:
             goal = there[np.linalg.norm(ground.xyz[there, :2] - middle(t), axis=1).argmin()]
             way = ground.xyz[ground.wide_ways(np.array([goal])).cells(ground.cell_at(feet))]
             line = shapely.LineString(np.concatenate([[feet], way])[:, :2])
-            angle = bearing(feet[:2], last.yaw, np.array(line.interpolate(SETS_OFF).coords[0]))
+            first, angle = (
+                bearing(feet[:2], last.yaw, np.array(line.interpolate(x).coords[0])) for x in (SETS_OFF / 2, SETS_OFF)
+            )
             shortest, *others = (math.degrees(wrap(x - last.yaw)) for x in set_offs(ground, feet, int(goal)))
-            if line.length > LEAST_WAY and side_of(angle, SET_OFF_SIDES) == side_of(shortest, SET_OFF_SIDES):
+            ways = {side_of(shortest, SET_OFF_SIDES), side_of(angle, SET_OFF_SIDES)}
+            if line.length > LEAST_WAY and ways == {side_of(first, SET_OFF_SIDES, FIRST_SIDE)}:
                 yield from sided(s, angle, SET_OFF_SIDES, (t.id,), others, a=name)
 
 
