@@ -175,8 +175,13 @@ def less_guessed(questions: Questions, scores: np.ndarray, sure: np.ndarray) -> 
     levels = [chance([questions[k] for k in part.tolist()]) + NEAR_CHANCE for part in parts]
     above, k = max((float(scores[part].mean()) - level, k) for k, (part, level) in enumerate(zip(parts, levels)))
     likely = parts[k][scores[parts[k]] >= scores[parts[k]].mean()]
+    likely = likely[np.argsort(-sure[likely], kind="stable")]
+    if questions[0].options and len({frozenset(q.options) for q in questions}) == 1:  # as many of every answer
+        nth = Counter[str]()
+        ranks = [nth.update([questions[i].answer]) or nth[questions[i].answer] for i in likely.tolist()]
+        likely = likely[np.argsort(ranks, kind="stable")]
     most = max(0, math.ceil(above * len(parts[k]) / max(1 - levels[k], NEAR_CHANCE)))
-    drop = {*likely[np.argsort(-sure[likely], kind="stable")[:most]].tolist()}
+    drop = {*likely[:most].tolist()}
     return [q for i, q in enumerate(questions) if i not in drop]
 
 

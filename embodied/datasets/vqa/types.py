@@ -36,7 +36,7 @@ AHEAD, BEHIND, NEXT_TO, HALVED, TRIES = 60.0, 95.0, 0.5, "curtain", 6
 """Degrees off their way up to which people see things, and from which they do not; metres within which what is not on
 something might be taken to be; a class whose halves people count; times that a thing is asked about with others."""
 SUNNY, LIGHT, SHADY = (math.cos(math.radians(degrees)) for degrees in (50, 70, 115))
-HIGH, LATER = 0.15, (7.0, 9.0, 15.0, 17.0, 19.0)
+HIGH, LATER = 0.15, (7.0, 8.0, 9.0, 10.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0)
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 """Cosines between where a window looks and the sun, at least of a sunny room, of one whose light may reach through a
 passage, and at most of others; the least height of the sun, the sine; hours that are asked about."""
@@ -287,7 +287,7 @@ def seen_by(s: WalkScene) -> Asked:
         ahead = [t for t in ahead if abs(bearing(middle(p), facing_of(p.yaw), middle(t))) < AHEAD]
         wrong = [(q, n) for q, n in wrong if q.parent not in {t.id for t in ahead}]
         mirrored = any(s.house.placement_by_id[i].object_class == "mirror" for i in seen)
-        for t, right in s.named(ahead)[: len(wrong) > 1 and not mirrored]:
+        for t, right in s.named(ahead)[: 2 * (len(wrong) > 1 and not mirrored)]:
             yield s.ask(right, (p.id, t.id, *(q.id for q, _ in wrong)), [n for _, n in wrong], a=name)
 
 
