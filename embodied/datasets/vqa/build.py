@@ -36,7 +36,7 @@ from embodied.scene.model import takeable
 from embodied.seeds import stream
 from embodied.world import World
 
-WALKS, CHANGES, ROOMS, SPARE, WRITERS = 2, 2, 4, 6, 3
+WALKS, CHANGES, ROOMS, SPARE, WRITERS = 2, 2, 4, 12, 3
 """Walks through a house; its rooms that are visited twice; most rooms of each walk; times as many questions as are
 wanted that are drawn; people who ask."""
 WIDE, PASSING = (0.6, 0.8), 0.1
