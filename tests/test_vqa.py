@@ -133,9 +133,13 @@ def test_a_name_means_one_thing_to_who_reads_it(hand):
 def test_the_next_step_has_no_other_way_as_short():
     table = Placement("table_1", "", "table", "living_room_1", (2.5, 2.0, 0.0), 0.0, (1.4, 1.8, 0.8))
     ground = FloorWays(dataclasses.replace(two_rooms(), placements=(table,)))
-    around = lambda y: [
-        math.degrees(x) for x in set_offs(ground, np.array([1.1, y, 0.0]), ground.cell_at(np.array([4.4, y])))
-    ]
+
+    def around(y: float) -> list[float]:
+        feet = np.array([1.1, y, 0.0])
+        walked = ground.ways(np.array([ground.cell_at(feet)])).metres
+        ways = set_offs(ground, feet, walked, ground.cell_at(np.array([4.4, y])))
+        return [math.degrees(x) for x in ways]
+
     left, right = sorted(around(2.0))
     assert -90 < left < -30 and 30 < right < 90 and len(around(3.4)) == 1
 

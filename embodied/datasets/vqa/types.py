@@ -325,6 +325,7 @@ def next_step(s: WalkScene) -> Asked:
     last, ground = s.walk.frames[-1], _ground(s.house)
     room = s.graph.room_of_node[int(np.argmin(np.linalg.norm(s.graph.positions - last.position, axis=1)))]
     feet = np.array([*last.position[:2], s.house.storey_of(s.house.room_by_id[room]).elevation])
+    walked = ground.ways(np.array([ground.cell_at(feet)])).metres
     for t, name in s.named([t for t in s.things if t.room != room]):
         there = np.flatnonzero(ground.room_of_cell == t.room)
         if len(there):
@@ -334,27 +335,31 @@ def next_step(s: WalkScene) -> Asked:
             first, angle = (
                 bearing(feet[:2], last.yaw, np.array(line.interpolate(x).coords[0])) for x in (SETS_OFF / 2, SETS_OFF)
             )
-            shortest, *others = (math.degrees(wrap(x - last.yaw)) for x in set_offs(ground, feet, int(goal)))
+            shortest, *others = (math.degrees(wrap(x - last.yaw)) for x in set_offs(ground, feet, walked, int(goal)))
             ways = {side_of(shortest, SET_OFF_SIDES), side_of(angle, SET_OFF_SIDES)}
             if line.length > LEAST_WAY and ways == {side_of(first, SET_OFF_SIDES, FIRST_SIDE)}:
                 yield from sided(s, angle, SET_OFF_SIDES, (t.id,), others, a=name)
 
 
-def set_offs(ground: FloorWays, feet: np.ndarray, goal: int) -> list[float]:
+def set_offs(ground: FloorWays, feet: np.ndarray, walked: np.ndarray, goal: int) -> list[float]:
     """Radians in which the shortest way to a cell sets off, and then another to another side that is as short, if there
-    is one: by the lengths of the ways over all places that are SETS_OFF away, which have more than one valley."""
-    here = ground.ways(np.array([ground.cell_at(feet)])).metres
-    ring = np.flatnonzero(np.abs(here - SETS_OFF) < ON_RING)
+    is one: by the lengths of the ways over all places that are SETS_OFF away, which have more than one valley.
+
+    Args:
+      feet: (2,) or (3,) metres, world.
+      walked: (n,) metres from there to every cell.
+    """
+    ring = np.flatnonzero(np.abs(walked - SETS_OFF) < ON_RING)
     if not len(ring):
         return [direction(feet[:2], ground.xyz[goal, :2])]
-    metres = here[ring] + ground.ways(np.array([goal])).metres[ring]
+    metres = walked[ring] + ground.ways(np.array([goal])).metres[ring]
     away, first = np.array([direction(feet[:2], at) for at in ground.xyz[ring, :2]]), int(metres.argmin())
-    signed, ridge, none = np.degrees(wrap(away - away[first])), metres.copy(), np.zeros(len(ring))
+    signed, ridge, widest = np.degrees(wrap(away - away[first])), metres.copy(), np.zeros(len(ring))
     for side in (signed >= 0, signed <= 0):
         outwards = np.flatnonzero(side)[np.argsort(np.abs(signed[side]))]
         ridge[outwards] = np.maximum.accumulate(metres[outwards])
-        none[outwards] = np.maximum.accumulate(np.diff(np.abs(signed[outwards]), prepend=0.0))
-    far = (np.abs(signed) > ANOTHER) & ((metres < ridge - RIDGE) | (none > NOTHING))
+        widest[outwards] = np.maximum.accumulate(np.diff(np.abs(signed[outwards]), prepend=0.0))
+    far = (np.abs(signed) > ANOTHER) & ((metres < ridge - RIDGE) | (widest > NOTHING))
     short = far & (metres < max(AS_SHORT[0] * metres[first], metres[first] + AS_SHORT[1]))
     return away[[first, *([int(np.where(short, metres, np.inf).argmin())] if short.any() else [])]].tolist()
 
