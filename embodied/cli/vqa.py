@@ -183,7 +183,7 @@ def sheet(data: VqaData, question: VqaQuestion, columns: int = 4, line: int = 24
     files = data.frames(question.walk)
     house = House.load(files[0].parents[1] / "house.json")
     number = {p.id: i + 1 for i, p in enumerate(house.placements)}
-    number |= read_json(files[0].with_name("walk.json"))["inside"]
+    number |= read_json(files[0].with_name("walk.json")).get("inside", {})
     outlined = [(name, number[name], c) for name, c in zip(question.about, COLOURS) if name in number]
     ids = [read_frame(f.with_suffix(".png"), cv2.IMREAD_UNCHANGED) for f in files]
     best = {max(range(len(ids)), key=lambda k: (ids[k] == i).sum()) for _, i, _ in outlined}

@@ -154,7 +154,8 @@ def read_frame(path: Path, mode: int = cv2.IMREAD_COLOR) -> np.ndarray:
 def shares_of(world: World, ids: np.ndarray) -> dict[str, float]:
     """Placements, and what lies in open furniture, to their shares of a picture of instance ids."""
     counts, there = np.bincount(ids.ravel(), minlength=1)[1:], {p.id for p in world.shown.placements}
-    shares = {world.drawn[i]: round(float(counts[i]) / ids.size, 5) for i in np.flatnonzero(counts)}
+    drawn = world.drawn
+    shares = {drawn[i]: round(float(counts[i]) / ids.size, 5) for i in np.flatnonzero(counts)}
     return {name: share for name, share in shares.items() if name in there}
 
 
