@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -30,7 +31,10 @@ from embodied.scene.model import loose, takeable
 ASKING: Mapping[str, Any] = read_toml(Path(templates.__file__).with_name("vqa.toml"))
 """Type to habit to templates; and 'alike', groups of classes that people do not tell apart, 'unsaid', synonyms that
 mislead, 'parts', classes that may be seen in others, and further classes that vqa.toml explains."""
-ALIKE: Mapping[str, list[str]] = {name: group for group in ASKING["alike"] for name in group}
+ALIKE: Mapping[str, list[str]] = {
+    name: list(dict.fromkeys(c for group in ASKING["alike"] if name in group for c in group))
+    for name in itertools.chain(*ASKING["alike"])
+}
 SAME_COLOUR: Mapping[str, list[str]] = {name: group for group in ASKING["same_colour"] for name in group}
 UNLIKE = {*ASKING["unlike"]}
 """Classes and assets that look like other things: nothing is asked about them."""
